@@ -1,0 +1,10 @@
+# All .cpp files of the named stages: src/<stage>/*.cpp, in a fixed order.
+function(tribin_stage_sources OUT)
+  set(sources)
+  foreach(stage ${ARGN})
+    file(GLOB files CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/${stage}/*.cpp)
+    list(SORT files)
+    list(APPEND sources ${files})
+  endforeach()
+  set(${OUT} ${sources} PARENT_SCOPE)
+endfunction()

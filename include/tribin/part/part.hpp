@@ -1,0 +1,63 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "tribin/cad/mesh.hpp"
+#include "tribin/model/primitive_model.hpp"
+
+namespace tribin {
+
+/// Turning by any angle about this axis leaves the part as it is.
+struct ContinuousSymmetry {
+  Vec3 axis = Vec3::UnitZ();
+  Vec3 point = Vec3::Zero();
+};
+
+/// The rigid motions that leave the part as it is (part_from_part).
+struct SymmetryGroup {
+  std::vector<Pose> discrete;                   ///< with the identity first
+  std::vector<ContinuousSymmetry> continuous;   ///< none or one
+};
+
+/// A pose that leaves most of the surface in place, and what tells it from the true one.
+struct SelfSimilarPose {
+  Pose part_from_part = Pose::Identity();
+  double overlap = 0;                           ///< share of the surface that stays in place
+  std::vector<Vec3f> discriminating_points;     ///< on the part, where the two differ
+};
+
+/// What a camera sees of the part from one direction.
+struct PartView {
+  Vec3 direction = Vec3::UnitZ();   ///< unit, from the part towards the camera, part frame
+  std::vector<Vec3f> points;        ///< visible surface points, part frame
+  std::vector<Vec3f> normals;
+  double area_mm2 = 0;              ///< projected
+};
+
+/// A CAD file made ready for finding it in scans.
+struct Part {
+  std::string name;
+  Mesh mesh;
+  PrimitiveModel model;
+  Vec3 box_min = Vec3::Zero();
+  Vec3 box_max = Vec3::Zero();
+  double diameter_mm = 0;           ///< largest distance between two vertices
+  double area_mm2 = 0;
+  SymmetryGroup symmetry;
+  std::vector<SelfSimilarPose> self_similar;
+  std::vector<PartView> views;
+  std::vector<std::string> warnings;
+
+  Vec3 box_center() const { return 0.5 * (box_min + box_max); }
+};
+
+struct PartOptions {
+  std::string name;   ///< empty = the mesh's name
+};
+
+/// Compiles a CAD mesh into a part: primitives by the one segmentation, symmetries, views.
+/// \throws Error too_little_data for a mesh without area.
+Part compile_part(const Mesh& mesh, const PartOptions& options = {});
+
+}  // namespace tribin

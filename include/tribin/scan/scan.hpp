@@ -1,0 +1,53 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tribin/core/camera.hpp"
+#include "tribin/core/image.hpp"
+
+namespace tribin {
+
+/// How far depths are off. "sigma correlated over c px" is white noise filtered by a Gaussian kernel of sd c px and
+/// scaled to sd sigma.
+struct NoiseProfile {
+  double sigma_mm = 0;         ///< sd of z at the scan's median depth; 0 = unknown, estimated from the scan
+  double correlation_px = -1;  ///< c above, in [0, 5]; < 0 = unknown, estimated from the scan
+  double scale_error = 0;      ///< sd of the relative scale error, common to the whole scan (systematic)
+  double offset_mm = 0;        ///< sd of a common depth offset (systematic)
+};
+
+/// An organized depth scan: z along the optical axis of an ideal pinhole. x and y are never stored.
+struct Scan {
+  Image<float> z_mm;               ///< H x W, NaN = no measurement
+  PinholeCamera camera;
+  NoiseProfile noise;
+  Image<std::uint8_t> modulation;  ///< H x W grey levels of fringe modulation; empty if not known
+  Image<std::uint8_t> invalid_reason;
+  Image<Vec3f> rays;               ///< only where the grid is no pinhole: ray with z = 1 of each pixel; else empty
+  Pose input_from_camera = Pose::Identity();  ///< the file's own frame; results are given in it
+  std::string source;              ///< file name, for messages
+  std::vector<std::string> warnings;
+
+  int width() const { return z_mm.width; }
+  int height() const { return z_mm.height; }
+  Vec3 point(int u, int v) const {
+    const double z = z_mm(u, v);
+    return rays.empty() ? camera.point(u, v, z) : Vec3(rays(u, v).cast<double>() * z);
+  }
+};
+
+/// Number of pixels with a measurement.
+std::size_t valid_count(const Scan& scan);
+
+/// Loose points, without a grid.
+struct PointSet {
+  std::vector<Vec3f> points;     ///< mm, in the file's frame; no NaN
+  std::optional<Vec3> viewpoint; ///< where the camera stood; none = normals stay unsigned
+  std::string source;
+  std::vector<std::string> warnings;
+};
+
+}  // namespace tribin
