@@ -45,7 +45,7 @@ struct Surfels {
 };
 
 struct SurfelOptions {
-  int cell_px = 4;              ///< [px] 2..16; small parts want small cells
+  int cell_px = 0;              ///< [px] 2..16; 0 = 4, or more where the noise hides the curvature of max_radius_mm
   float max_radius_mm = 100;    ///< largest radius that must be told from a plane; sets what "flat" must prove
 };
 
