@@ -5,6 +5,7 @@
 
 #include "tribin/cad/mesh.hpp"
 #include "tribin/model/primitive_model.hpp"
+#include "tribin/pose/index_render.hpp"
 
 namespace tribin {
 
@@ -30,8 +31,8 @@ struct SelfSimilarPose {
 /// What a camera sees of the part from one direction.
 struct PartView {
   Vec3 direction = Vec3::UnitZ();   ///< unit, from the part towards the camera, part frame
-  std::vector<Vec3f> points;        ///< visible surface points, part frame
-  std::vector<Vec3f> normals;
+  std::vector<Vec3f> points;        ///< visible surface points, part frame; any prefix covers the view evenly
+  std::vector<Vec3f> normals;       ///< their facets' normals
   double area_mm2 = 0;              ///< projected
 };
 
@@ -39,11 +40,15 @@ struct PartView {
 struct Part {
   std::string name;
   Mesh mesh;
+  RenderMesh render_mesh;
   PrimitiveModel model;
+  std::vector<double> exposed_mm2;  ///< of each primitive: projected area, mean over all views (0 = never seen)
+  std::vector<std::int32_t> primitive_of_triangle;  ///< primitive id, 0 = none
   Vec3 box_min = Vec3::Zero();
   Vec3 box_max = Vec3::Zero();
   double diameter_mm = 0;           ///< largest distance between two vertices
   double area_mm2 = 0;
+  double gyration_mm = 0;           ///< rms distance of the surface from the box centre: turns radians into mm
   SymmetryGroup symmetry;
   std::vector<SelfSimilarPose> self_similar;
   std::vector<PartView> views;
@@ -51,6 +56,9 @@ struct Part {
 
   Vec3 box_center() const { return 0.5 * (box_min + box_max); }
 };
+
+/// The view whose direction is nearest to a direction in the part frame.
+const PartView& nearest_view(const Part& part, const Vec3& direction);
 
 struct PartOptions {
   std::string name;   ///< empty = the mesh's name

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "tribin/cad/mesh.hpp"
+#include "tribin/core/camera.hpp"
+
+namespace tribin {
+
+/// A mesh laid out for rendering: facet planes beside the triangles, float coordinates.
+struct RenderMesh {
+  std::vector<Vec3f> vertices;                           ///< part frame, mm
+  std::vector<std::array<std::uint32_t, 3>> triangles;
+  std::vector<Vec3f> normals;                            ///< unit, outward, one a triangle
+  bool two_sided = false;                                ///< the mesh has no known orientation
+  Vec3 box_min = Vec3::Zero();
+  Vec3 box_max = Vec3::Zero();
+};
+
+RenderMesh make_render_mesh(const Mesh& mesh);
+
+/// Which triangle each pixel of a window sees, and how far away. Pixel (i, j) of the window is pixel
+/// (u0 + i * step, v0 + j * step) of the camera.
+struct IndexRender {
+  int u0 = 0, v0 = 0;
+  int width = 0, height = 0;
+  int step = 1;
+  std::vector<std::int32_t> triangle;  ///< -1 = the part is not seen
+  std::vector<float> inverse_z;        ///< [1/mm], 0 where not seen
+  std::vector<Vec3f> normal;           ///< facet normals in the camera frame, one a TRIANGLE; valid for seen triangles
+  std::size_t silhouette_pixels = 0;   ///< seen pixels
+
+  std::size_t index(int i, int j) const { return static_cast<std::size_t>(j) * width + i; }
+};
+
+/// Renders the part at a pose with a z-buffer; every `step`-th pixel each way.
+/// \param render  filled; its buffers are reused between calls.
+/// \cost          about 40 ns a triangle plus 2 ns a covered pixel.
+void render_index(const RenderMesh& mesh, const PinholeCamera& camera, const Pose& camera_from_part, int step,
+                  IndexRender& render);
+
+}  // namespace tribin

@@ -1,0 +1,71 @@
+#include "tribin/part/part.hpp"
+
+#include <cmath>
+
+#include "tribin/core/error.hpp"
+#include "views.hpp"
+
+namespace tribin {
+namespace {
+
+double largest_distance(const std::vector<Vec3f>& vertices) {
+  // Only vertices that are extreme in some direction can be an end of the diameter.
+  std::vector<Vec3f> extreme;
+  std::vector<bool> taken(vertices.size(), false);
+  for (const Vec3f& d : golden_spiral(1024)) {
+    std::size_t lo = 0, hi = 0;
+    float lo_dot = 1e30f, hi_dot = -1e30f;
+    for (std::size_t i = 0; i < vertices.size(); ++i) {
+      const float x = vertices[i].dot(d);
+      if (x < lo_dot) lo_dot = x, lo = i;
+      if (x > hi_dot) hi_dot = x, hi = i;
+    }
+    for (const std::size_t i : {lo, hi})
+      if (!taken[i]) {
+        taken[i] = true;
+        extreme.push_back(vertices[i]);
+      }
+  }
+  double best = 0;
+  for (std::size_t i = 0; i < extreme.size(); ++i)
+    for (std::size_t j = i + 1; j < extreme.size(); ++j)
+      best = std::max(best, static_cast<double>((extreme[i] - extreme[j]).norm()));
+  return best;
+}
+
+}  // namespace
+
+Part compile_part(const Mesh& mesh, const PartOptions& options) {
+  Part part;
+  part.name = options.name.empty() ? mesh.name : options.name;
+  part.mesh = mesh;
+  part.render_mesh = make_render_mesh(mesh);
+  part.box_min = part.render_mesh.box_min;
+  part.box_max = part.render_mesh.box_max;
+  part.diameter_mm = largest_distance(mesh.vertices);
+
+  double moment = 0;
+  for (const auto& t : mesh.triangles) {
+    const Eigen::Vector3d a = mesh.vertices[t[0]].cast<double>(), b = mesh.vertices[t[1]].cast<double>(),
+                          c = mesh.vertices[t[2]].cast<double>();
+    const double area = 0.5 * (b - a).cross(c - a).norm();
+    part.area_mm2 += area;
+    moment += area * ((a + b + c) / 3 - Eigen::Vector3d(part.box_center())).squaredNorm();
+  }
+  if (!(part.area_mm2 > 0) || !(part.diameter_mm > 0))
+    throw Error(ErrorCode::too_little_data, part.name + ": the CAD has no surface (" + std::to_string(mesh.triangles.size()) +
+                                                " triangles, area 0); a closed or open surface is wanted");
+  part.gyration_mm = std::sqrt(moment / part.area_mm2);
+
+  const Surfels surfels = surfels_from_mesh(part.mesh);
+  const Primitives primitives = segment(surfels);
+  part.model = build_model(primitives, surfels);
+  part.primitive_of_triangle = primitives.label_of_surfel;
+  TRIBIN_ASSERT(part.primitive_of_triangle.size() == mesh.triangles.size());
+  make_views(part);
+  part.symmetry.discrete = {Pose::Identity()};
+  part.warnings = mesh.warnings;
+  return part;
+}
+
+}  // namespace tribin

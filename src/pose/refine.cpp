@@ -1,0 +1,165 @@
+#include "tribin/pose/refine.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <array>
+#include <cmath>
+
+#include "tribin/core/parallel.hpp"
+
+namespace tribin {
+namespace {
+
+/// The normal equations of one band of rows.
+struct Sums {
+  std::array<double, 21> h{};
+  std::array<double, 6> b{};
+  double squares = 0, squares_sigma = 0, weight = 0;
+  int pixels = 0;
+
+  void add(const Sums& o) {
+    for (std::size_t i = 0; i < h.size(); ++i) h[i] += o.h[i];
+    for (std::size_t i = 0; i < b.size(); ++i) b[i] += o.b[i];
+    squares += o.squares;
+    squares_sigma += o.squares_sigma;
+    weight += o.weight;
+    pixels += o.pixels;
+  }
+};
+
+constexpr int kBandRows = 16;
+
+/// The outline is left out one rendered pixel wide: there the scan mixes two surfaces and the facet may be the wrong one.
+bool inside_silhouette(const IndexRender& r, int i, int j) {
+  if (i == 0 || j == 0 || i + 1 == r.width || j + 1 == r.height) return false;
+  const std::size_t k = r.index(i, j);
+  const float w = r.inverse_z[k];
+  const float jump = 0.004f * w * r.step;  // 0.4 % of the depth a pixel: steeper is an inner outline
+  for (const std::size_t n : {k - 1, k + 1, k - static_cast<std::size_t>(r.width), k + static_cast<std::size_t>(r.width)})
+    if (r.triangle[n] < 0 || std::abs(r.inverse_z[n] - w) > jump) return false;
+  return true;
+}
+
+Sums accumulate(const SceneDepth& scene, const IndexRender& render, const Eigen::Vector3d& center, double scale_mm,
+                double cad_sigma_mm, bool final_pass) {
+  std::vector<Sums> bands(static_cast<std::size_t>((render.height + kBandRows - 1) / kBandRows));
+  const PinholeCamera& camera = scene.camera;
+  parallel_ranges(render.height, kBandRows, [&](int begin, int end) {
+    Sums& s = bands[static_cast<std::size_t>(begin / kBandRows)];
+    for (int j = begin; j < end; ++j) {
+      const int v = render.v0 + j * render.step;
+      for (int i = 0; i < render.width; ++i) {
+        const std::int32_t k = render.triangle[render.index(i, j)];
+        if (k < 0) continue;
+        const int u = render.u0 + i * render.step;
+        const float z = scene.z_mm(u, v);
+        if (!(z > 0) || scene.near_break(u, v) || !inside_silhouette(render, i, j)) continue;
+        const double rx = (u - camera.cx) / camera.fx, ry = (v - camera.cy) / camera.fy;
+        const Vec3f& nf = render.normal[static_cast<std::size_t>(k)];
+        const double nx = nf[0], ny = nf[1], nz = nf[2];
+        const double along = nx * rx + ny * ry + nz;  // n . ray, negative
+        const double z_model = 1.0 / render.inverse_z[render.index(i, j)];
+        const double r = (z - z_model) * along;       // signed distance of the scan point from the facet
+        const double sigma_noise = scene.sigma_mm(u, v) * std::abs(along);
+        const double variance = sigma_noise * sigma_noise + cad_sigma_mm * cad_sigma_mm;
+        const double scale2 = std::max(scale_mm * scale_mm, 9.0 * variance);
+        const double g = scale2 / (scale2 + r * r);
+        const double robust = g * g;
+        if (final_pass && robust < 0.25) continue;
+        const double w = (final_pass ? 1.0 : robust) / variance;
+        const double px = rx * z - center.x(), py = ry * z - center.y(), pz = z - center.z();
+        const std::array<double, 6> jac = {nx, ny, nz, py * nz - pz * ny, pz * nx - px * nz, px * ny - py * nx};
+        std::size_t m = 0;
+        for (std::size_t a = 0; a < 6; ++a) {
+          const double wa = w * jac[a];
+          s.b[a] += wa * r;
+          for (std::size_t c = a; c < 6; ++c) s.h[m++] += wa * jac[c];
+        }
+        s.squares += robust * r * r;
+        s.squares_sigma += robust * r * r / variance;
+        s.weight += robust;
+        s.pixels += robust > 0.25;
+      }
+    }
+  });
+  Sums total;
+  for (const Sums& s : bands) total.add(s);
+  return total;
+}
+
+Matrix6 matrix_from(const Sums& s) {
+  Matrix6 h;
+  std::size_t m = 0;
+  for (int a = 0; a < 6; ++a)
+    for (int c = a; c < 6; ++c) h(a, c) = h(c, a) = s.h[m++];
+  return h;
+}
+
+/// Solves H x = b with x orthogonal to the frozen directions, in coordinates where radians count `lever` mm. Directions that
+/// hold less than a millionth of the best one's information stay where they are.
+Vector6 solve(const Matrix6& h, const Vector6& b, const std::vector<Vector6>& frozen, double lever) {
+  Eigen::Matrix<double, 6, 1> scale;
+  scale << 1, 1, 1, 1 / lever, 1 / lever, 1 / lever;
+  Eigen::Matrix<double, 6, 6> hs = scale.asDiagonal() * h * scale.asDiagonal();
+  Eigen::Matrix<double, 6, 1> bs = scale.asDiagonal() * b;
+  Eigen::Matrix<double, 6, 6> keep = Eigen::Matrix<double, 6, 6>::Identity();
+  for (const Vector6& f : frozen) {
+    Eigen::Matrix<double, 6, 1> d = f.cwiseQuotient(scale);
+    d = keep * d;
+    if (d.norm() < 1e-12) continue;
+    d.normalize();
+    keep -= d * d.transpose();
+  }
+  hs = keep * hs * keep;
+  bs = keep * bs;
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> eigen(hs);
+  const double limit = 1e-6 * std::max(eigen.eigenvalues()(5), 1e-300);
+  Eigen::Matrix<double, 6, 1> x = Eigen::Matrix<double, 6, 1>::Zero();
+  for (int k = 0; k < 6; ++k)
+    if (eigen.eigenvalues()(k) > limit)
+      x += eigen.eigenvectors().col(k) * (eigen.eigenvectors().col(k).dot(bs) / eigen.eigenvalues()(k));
+  return Vector6(scale.cwiseProduct(x));
+}
+
+}  // namespace
+
+Refinement refine_pose(const RenderMesh& mesh, const SceneDepth& scene, const Pose& start, const RefineOptions& options) {
+  Refinement out;
+  out.camera_from_part = start;
+  thread_local IndexRender render;
+  const double end_scale = 3 * std::hypot(scene.median_sigma_mm, options.cad_sigma_mm);
+  const double ratio = std::pow(std::max(1.0, options.start_scale_mm / end_scale), 1.0 / std::max(1, options.iterations - 2));
+  double scale = options.start_scale_mm;
+  for (int it = 0; it <= options.iterations; ++it) {
+    const bool final_pass = it == options.iterations;
+    const Eigen::Vector3d center = out.camera_from_part * Eigen::Vector3d(options.center);
+    render_index(mesh, scene.camera, out.camera_from_part, options.step_px, render);
+    const Sums sums =
+        accumulate(scene, render, center, std::max(scale, end_scale), options.cad_sigma_mm, final_pass);
+    out.information = matrix_from(sums);
+    out.pixels = sums.pixels;
+    out.rms_mm = sums.weight > 0 ? std::sqrt(sums.squares / sums.weight) : 0;
+    out.rms_sigma = sums.weight > 0 ? std::sqrt(sums.squares_sigma / sums.weight) : 0;
+    if (final_pass || sums.pixels < 12) break;
+    Vector6 b;
+    for (int a = 0; a < 6; ++a) b[a] = sums.b[static_cast<std::size_t>(a)];
+    Vector6 delta = solve(out.information, b, options.frozen, options.lever_mm);
+    // A step may not outrun the association: at most the current scale's reach.
+    const double length = std::max(delta.head<3>().norm(), delta.tail<3>().norm() * options.lever_mm);
+    const double reach = 4 * std::max(scale, end_scale);
+    if (length > reach) delta *= reach / length;
+    Pose next = out.camera_from_part;
+    const Matrix3 turn = rotation_from_vector(delta.tail<3>());
+    next.linear() = turn * out.camera_from_part.linear();
+    next.translation() = turn * (out.camera_from_part.translation() - center) + center + Eigen::Vector3d(delta.head<3>());
+    out.camera_from_part = next;
+    scale /= ratio;
+    if (length < 1e-5 && scale <= end_scale) {
+      // Converged: what is left is the final pass.
+      it = options.iterations - 1;
+    }
+  }
+  return out;
+}
+
+}  // namespace tribin
