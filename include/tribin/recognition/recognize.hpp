@@ -1,0 +1,27 @@
+#pragma once
+
+#include <span>
+
+#include "tribin/model/primitive_model.hpp"
+#include "tribin/part/part.hpp"
+#include "tribin/recognition/instance.hpp"
+
+namespace tribin {
+
+struct RecognitionOptions {
+  double tolerance_mm = 0;   ///< asked-for accuracy of the place; 0 = none. Refuses what is not sure enough
+  double tolerance_rad = 0;  ///< and of the rotation
+  int time_limit_ms = 0;     ///< 0 = none
+};
+
+/// Finds the parts in a scan: hypotheses from primitives, looked up in the depth image, verified by rendering, chosen
+/// jointly, refined, with covariance and evidence; what was refused is told with its reason.
+/// \param primitives   the scan's segmentation.
+/// \param observation  its model.
+/// \param surfels      of the scan; surfels.scan is the measuring source.
+/// \source Barajas et al., section IV-B and C give the steps; hypotheses, look-up, verification and refinement are ours
+///         (docs/recognition.md).
+Instances recognize(const Primitives& primitives, const PrimitiveModel& observation, const Surfels& surfels,
+                    std::span<const Part> parts, const RecognitionOptions& options = {});
+
+}  // namespace tribin

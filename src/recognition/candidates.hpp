@@ -1,0 +1,34 @@
+#pragma once
+
+#include <vector>
+
+#include "hypotheses.hpp"
+#include "tribin/core/reason.hpp"
+#include "tribin/pose/refine.hpp"
+#include "tribin/pose/verification.hpp"
+
+namespace tribin {
+
+/// A pose of a part that survived the look-up and was refined and verified by rendering.
+struct Candidate {
+  int part = 0;  ///< index into the parts
+  Pose camera_from_part = Pose::Identity();
+  Verification verification;
+};
+
+/// How many pixels the part covers at most, at the depth of a pose.
+double covered_pixels(const Part& part, const SceneDepth& scene, const Pose& camera_from_part);
+/// Render step that leaves about `pixels` of the part.
+int step_for(const Part& part, const SceneDepth& scene, const Pose& camera_from_part, double pixels);
+
+VerificationOptions verification_options(const Part& part, int step_px, double tolerance_mm);
+RefineOptions refine_options(const Part& part, int step_px, int iterations, double start_scale_mm);
+
+/// All candidates of one part in the scan, best evidence first.
+std::vector<Candidate> find_candidates(const SceneFeatures& features, const SceneDepth& scene, const Part& part,
+                                       int part_index, std::vector<Reason>& rejected);
+
+/// Do two poses of one part mean the same placing, up to the look-up's coarse steps?
+bool close_poses(const Part& part, const Pose& a, const Pose& b, double distance_mm, double angle);
+
+}  // namespace tribin

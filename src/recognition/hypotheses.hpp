@@ -1,0 +1,60 @@
+#pragma once
+
+#include <vector>
+
+#include "tribin/model/primitive_model.hpp"
+#include "tribin/part/part.hpp"
+#include "tribin/pose/scene_depth.hpp"
+
+// Hypotheses: poses of a part that some primitives of the scan suggest. They are many and cheap; the look-up in the depth
+// image decides which are worth more work. Every generator writes into one list, in an order that depends on the input alone.
+namespace tribin {
+
+/// A scene primitive with what the generators need to know of it.
+struct SceneFeature {
+  const Primitive* primitive = nullptr;
+  Vec3 centroid = Vec3::Zero();  ///< of its surfels, by area
+  double reach_mm = 0;           ///< largest distance of a surfel from the centroid
+};
+
+/// The scene as the generators see it.
+struct SceneFeatures {
+  std::vector<SceneFeature> features;          ///< one a primitive of the observation, same order
+  const PrimitiveModel* observation = nullptr;
+  const Surfels* surfels = nullptr;
+  const Primitives* primitives = nullptr;
+};
+
+SceneFeatures make_scene_features(const Primitives& primitives, const PrimitiveModel& observation, const Surfels& surfels);
+
+/// A plane or cylinder of the CAD with what the generators need to know of it.
+struct PartFeature {
+  const Primitive* primitive = nullptr;
+  double exposed_mm2 = 0;
+  double reach_mm = 0;
+};
+
+/// The part's primitives that can be seen, best exposed first.
+std::vector<PartFeature> visible_features(const Part& part, PrimitiveType type, std::size_t most);
+
+/// Too large to be a piece of the part: a table, a floor, a wall of the bin.
+bool is_background(const SceneFeature& feature, const Part& part);
+
+/// One cylinder: both senses of the axis, spins, slides. Leaves 2 of 6 directions to the enumeration.
+void hypotheses_from_cylinders(const SceneFeatures& scene, const Part& part, std::vector<Pose>& out);
+/// One plane: spins and places of the seen piece on the CAD's face. Leaves 3 of 6 to the enumeration.
+void hypotheses_from_planes(const SceneFeatures& scene, const Part& part, std::vector<Pose>& out);
+/// Two planes, two cylinders, or a plane and a cylinder whose angle, distance and radii agree: leaves at most a slide or a spin.
+void hypotheses_from_pairs(const SceneFeatures& scene, const Part& part, std::vector<Pose>& out);
+/// A region that no background explains, of the part's size: every view in every spin, centred on it.
+/// \source the paper's "distance based classifier in 2-D image space" (III-B), on what the other spaces leave.
+void hypotheses_from_regions(const SceneFeatures& scene, const Part& part, std::vector<Pose>& out);
+
+/// Rotation that turns frame (x, y) of the part onto that of the camera: camera_from_part with R x_part = x_camera and the
+/// y of both in one half plane.
+Matrix3 rotation_from_directions(const Vec3& x_part, const Vec3& y_part, const Vec3& x_camera, const Vec3& y_camera);
+
+/// The pose with this rotation that brings a part's point onto a camera's point.
+Pose pose_from(const Matrix3& rotation, const Vec3& part_point, const Vec3& camera_point);
+
+}  // namespace tribin
