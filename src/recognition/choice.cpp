@@ -1,0 +1,180 @@
+#include "choice.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "tribin/core/parallel.hpp"
+#include "tribin/pose/look_up.hpp"
+
+namespace tribin {
+namespace {
+
+// Pixels that a polished pose is fitted and compared on: enough for 0.1 sigma of any mean, a few ms a pose.
+constexpr double kPolishPixels = 6000;
+constexpr double kCompareFew = 1500;
+
+/// Poses that the part's own shape confuses with this one: its self-similar poses and discrete symmetries left out.
+std::vector<Pose> rivals(const Part& part, const Pose& pose) {
+  std::vector<Pose> out;
+  for (const SelfSimilarPose& s : part.self_similar) out.push_back(pose * s.part_from_part);
+  return out;
+}
+
+}  // namespace
+
+int CellMask::shared(const CellMask& other) const {
+  int n = 0;
+  for (std::size_t i = 0; i < std::min(bits.size(), other.bits.size()); ++i) n += std::popcount(bits[i] & other.bits[i]);
+  return n;
+}
+
+void CellMask::join(const CellMask& other) {
+  if (bits.size() < other.bits.size()) bits.resize(other.bits.size(), 0);
+  for (std::size_t i = 0; i < other.bits.size(); ++i) bits[i] |= other.bits[i];
+  count = 0;
+  for (const std::uint64_t b : bits) count += std::popcount(b);
+}
+
+CellMask mask_of(const Part& part, const SceneDepth& scene, const Candidate& candidate) {
+  CellMask mask;
+  const Image<Vec3f>& cells = scene.cell_normal;
+  mask.bits.assign((cells.size() + 63) / 64, 0);
+  IndexRender render;
+  render_index(part.render_mesh, scene.camera, candidate.camera_from_part, scene.cell_px, render);
+  const double near_mm = 0.02 * part.diameter_mm;
+  for (int j = 0; j < render.height; ++j)
+    for (int i = 0; i < render.width; ++i) {
+      const std::size_t k = render.index(i, j);
+      if (render.triangle[k] < 0) continue;
+      const int u = render.u0 + i * render.step, v = render.v0 + j * render.step;
+      const float z = scene.z_mm(u, v);
+      if (!(z > 0) || std::abs(z - 1 / render.inverse_z[k]) > near_mm + 5 * scene.sigma_mm(u, v)) continue;
+      const int cu = u / scene.cell_px, cv = v / scene.cell_px;
+      if (!cells.contains(cu, cv)) continue;
+      const std::size_t b = cells.index(cu, cv);
+      mask.bits[b / 64] |= std::uint64_t{1} << (b % 64);
+    }
+  for (const std::uint64_t b : mask.bits) mask.count += std::popcount(b);
+  return mask;
+}
+
+std::vector<double> log_likelihoods(const SceneDepth& scene, std::span<const std::pair<const Part*, Pose>> poses, int step_px) {
+  // All poses are judged on the union of their windows: what one explains and another does not counts against the other.
+  constexpr float kUnexplained = 0.5f * 16;  // 4 sigma, and what a pixel costs that no surface explains
+  std::vector<IndexRender> renders(poses.size());
+  int u0 = scene.camera.width, v0 = scene.camera.height, u1 = -1, v1 = -1;
+  parallel_each(static_cast<int>(poses.size()), [&](int i) {
+    const auto k = static_cast<std::size_t>(i);
+    render_index(poses[k].first->render_mesh, scene.camera, poses[k].second, step_px, renders[k]);
+  });
+  for (const IndexRender& r : renders) {
+    if (r.width == 0) continue;
+    u0 = std::min(u0, r.u0);
+    v0 = std::min(v0, r.v0);
+    u1 = std::max(u1, r.u0 + (r.width - 1) * step_px);
+    v1 = std::max(v1, r.v0 + (r.height - 1) * step_px);
+  }
+  std::vector<double> out(poses.size(), 0.0);
+  for (int v = v0; v <= v1; v += step_px)
+    for (int u = u0; u <= u1; u += step_px) {
+      const float z = scene.z_mm(u, v);
+      if (!(z > 0)) continue;
+      bool any = false;
+      for (const IndexRender& r : renders) {
+        const int i = (u - r.u0) / step_px, j = (v - r.v0) / step_px;
+        any = any || (u >= r.u0 && v >= r.v0 && i < r.width && j < r.height && r.triangle[r.index(i, j)] >= 0);
+      }
+      if (!any) continue;
+      for (std::size_t k = 0; k < poses.size(); ++k) {
+        const IndexRender& r = renders[k];
+        const int i = (u - r.u0) / step_px, j = (v - r.v0) / step_px;
+        const bool inside = u >= r.u0 && v >= r.v0 && i < r.width && j < r.height;
+        const std::int32_t triangle = inside ? r.triangle[r.index(i, j)] : -1;
+        double cost = kUnexplained;
+        if (triangle >= 0) {
+          const Vec3 ray = scene.camera.ray(u, v);
+          const double slant =
+              std::max(0.2, std::abs(r.normal[static_cast<std::size_t>(triangle)].cast<double>().dot(ray)));
+          const double sigma = std::hypot(scene.sigma_mm(u, v) * slant, poses[k].first->mesh.chord_error_mm);
+          const double e = (z - 1.0 / r.inverse_z[r.index(i, j)]) * slant / sigma;
+          cost = std::min(0.5 * e * e, static_cast<double>(kUnexplained));
+        }
+        out[k] -= cost;
+      }
+    }
+  // Pixels closer than the noise's correlation tell the same story.
+  const double inflation = std::max(1.0, correlation_inflation(scene.correlation_px) / (double(step_px) * step_px));
+  for (double& l : out) l /= inflation;
+  return out;
+}
+
+Polished polish(const SceneDepth& scene, std::span<const Part> parts, const Candidate& candidate) {
+  const Part& part = parts[static_cast<std::size_t>(candidate.part)];
+  const double noise = 4 * scene.median_sigma_mm;
+  const int few = step_for(part, scene, candidate.camera_from_part, kCompareFew);
+  const int fine = step_for(part, scene, candidate.camera_from_part, kPolishPixels);
+
+  // Coarse: every rival is settled on few pixels; only those near the best are worth more.
+  std::vector<Pose> poses = rivals(part, candidate.camera_from_part);
+  poses.insert(poses.begin(), candidate.camera_from_part);
+  std::vector<Verification> checks(poses.size());
+  parallel_each(static_cast<int>(poses.size()), [&](int i) {
+    const auto k = static_cast<std::size_t>(i);
+    if (k > 0) {
+      const double start = std::max(0.012 * part.diameter_mm, noise);
+      poses[k] = refine_pose(part.render_mesh, scene, poses[k], refine_options(part, few, 3, start)).camera_from_part;
+    }
+    checks[k] = verify_pose(part.render_mesh, scene, poses[k], verification_options(part, few, 0.004 * part.diameter_mm));
+  });
+  double best = -1e300;
+  for (const Verification& v : checks) best = std::max(best, v.gain);
+  std::vector<std::size_t> keep;
+  for (std::size_t k = 0; k < poses.size(); ++k)
+    if (k == 0 || checks[k].gain > 0.7 * best) keep.push_back(k);
+  std::stable_sort(keep.begin(), keep.end(), [&](std::size_t a, std::size_t b) { return checks[a].gain > checks[b].gain; });
+  if (keep.size() > 8) keep.resize(8);
+
+  // Fine: the survivors on more pixels, compared by likelihood.
+  std::vector<std::pair<const Part*, Pose>> finalists;
+  for (const std::size_t k : keep) finalists.emplace_back(&part, poses[k]);
+  parallel_each(static_cast<int>(finalists.size()), [&](int i) {
+    auto& f = finalists[static_cast<std::size_t>(i)];
+    f.second = refine_pose(part.render_mesh, scene, f.second, refine_options(part, fine, 4, std::max(0.004 * part.diameter_mm, noise)))
+                   .camera_from_part;
+  });
+  const std::vector<double> likelihood = log_likelihoods(scene, finalists, fine);
+  std::vector<std::size_t> order(finalists.size());
+  for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return likelihood[a] > likelihood[b]; });
+
+  Polished out;
+  out.candidate = candidate;
+  out.candidate.camera_from_part = finalists[order[0]].second;
+  out.candidate.verification = verify_pose(part.render_mesh, scene, out.candidate.camera_from_part,
+                                           verification_options(part, fine, 0.002 * part.diameter_mm));
+  out.log_likelihood = likelihood[order[0]];
+  out.mask = mask_of(part, scene, out.candidate);
+  for (std::size_t i = 1; i < order.size(); ++i) {
+    const Pose& other = finalists[order[i]].second;
+    if (!close_poses(part, other, out.candidate.camera_from_part, 0.02 * part.diameter_mm, 4 * kDegree))
+      out.others.emplace_back(other, likelihood[order[i]]);
+  }
+  return out;
+}
+
+bool acceptable(const Part& part, const Verification& v, std::vector<Reason>& rejected) {
+  const auto fails = [&](const char* test, double value, double limit, bool bad) {
+    if (bad) add_reason(rejected, {part.name, "verification", test, value, limit});
+    return bad;
+  };
+  // 40 supported pixels fix a pose no better than chance does; less is not a look at a part.
+  if (fails("pixels", v.supported, 40, v.supported < 40)) return false;
+  if (fails("visible_fraction", v.visible_fraction(), 0.2, v.visible_fraction() < 0.2)) return false;
+  if (fails("free_space", v.free_space(), 0.08, v.free_space() > 0.08)) return false;
+  if (fails("support", v.support(), 0.6, v.support() < 0.6)) return false;
+  if (fails("contour", v.contour(), 0.5, v.contour() < 0.5)) return false;
+  return true;
+}
+
+}  // namespace tribin

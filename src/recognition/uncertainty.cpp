@@ -1,0 +1,96 @@
+#include <Eigen/Eigenvalues>
+#include <cmath>
+
+#include "instance_report.hpp"
+
+namespace tribin {
+namespace {
+
+using Mat6 = Eigen::Matrix<double, 6, 6>;
+using Vec6 = Eigen::Matrix<double, 6, 1>;
+
+Eigen::Matrix3d cross_matrix(const Eigen::Vector3d& v) {
+  Eigen::Matrix3d m;
+  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
+  return m;
+}
+
+/// (centre shift, w) -> (dt, w): the origin moves by dc + w x (t - c).
+Mat6 origin_from_center(const Part& part, const Pose& pose) {
+  const Eigen::Vector3d c = pose * Eigen::Vector3d(part.box_center());
+  const Eigen::Vector3d t = pose.translation();
+  Mat6 m = Mat6::Identity();
+  m.topRightCorner<3, 3>() = -cross_matrix(t - c);
+  return m;
+}
+
+}  // namespace
+
+std::vector<Vector6> free_directions_about_center(const Part& part, const Pose& camera_from_part) {
+  std::vector<Vector6> out;
+  const Eigen::Vector3d c = camera_from_part * Eigen::Vector3d(part.box_center());
+  for (const ContinuousSymmetry& s : part.symmetry.continuous) {
+    const Eigen::Vector3d w = camera_from_part.linear() * Eigen::Vector3d(s.axis).normalized();
+    const Eigen::Vector3d p = camera_from_part * Eigen::Vector3d(s.point);
+    Vector6 d;
+    d << w.cross(c - p), w;
+    const double length = std::hypot(d.head<3>().norm(), d.tail<3>().norm() * part.gyration_mm);
+    out.push_back(d / length);
+  }
+  return out;
+}
+
+void describe_uncertainty(const Part& part, const SceneDepth& scene, const NoiseProfile& noise, const Refinement& refinement,
+                          Instance& instance) {
+  const double lever = part.gyration_mm;
+  Vec6 scale;
+  scale << 1, 1, 1, 1 / lever, 1 / lever, 1 / lever;
+  // Fit residuals beyond the noise (a casting, an unknown systematic term) count as noise.
+  const double excess = std::max(1.0, refinement.rms_sigma * refinement.rms_sigma);
+  const double inflation = correlation_inflation(scene.correlation_px) * excess;
+  Mat6 h = scale.asDiagonal() * Mat6(refinement.information) * scale.asDiagonal();
+  Mat6 keep = Mat6::Identity();
+  for (const Vector6& f : free_directions_about_center(part, instance.camera_from_part)) {
+    const Vec6 d = Vec6(f).cwiseQuotient(scale).normalized();
+    keep -= d * d.transpose();
+  }
+  h = keep * h * keep;
+  const Eigen::SelfAdjointEigenSolver<Mat6> eigen(h);
+  const std::size_t free_count = part.symmetry.continuous.size();
+  // Weak: not held better than 1 % of the diameter, a fifth of what counts as found. Such a direction keeps that spread at least.
+  const double weak_limit = 0.01 * part.diameter_mm;
+  Mat6 covariance = Mat6::Zero();
+  for (int k = static_cast<int>(free_count); k < 6; ++k) {
+    const double information = std::max(eigen.eigenvalues()(k) / inflation, 1 / (part.diameter_mm * part.diameter_mm));
+    const Vec6 e = eigen.eigenvectors().col(k);
+    const double sigma = 1 / std::sqrt(information);
+    covariance += e * e.transpose() * (sigma * sigma);
+    if (sigma > weak_limit) {
+      WeakDirection weak;
+      const Vec6 d = origin_from_center(part, instance.camera_from_part) * Vec6(scale.cwiseProduct(e));
+      weak.direction = Vector6(d.normalized());
+      weak.sigma_mm = sigma * e.head<3>().norm();
+      weak.sigma = sigma * e.tail<3>().norm() / lever;
+      weak.cure = e.head<3>().norm() > e.tail<3>().norm() ? "a view that shows a face across this direction"
+                                                          : "a view that shows a feature off this axis";
+      instance.weak_directions.push_back(weak);
+    }
+  }
+  covariance = Mat6(scale.asDiagonal()) * covariance * Mat6(scale.asDiagonal());
+  // Systematic: a common scale error moves the part along its own ray, an offset along the optical axis.
+  const Eigen::Vector3d c = instance.camera_from_part * Eigen::Vector3d(part.box_center());
+  covariance.topLeftCorner<3, 3>() += noise.scale_error * noise.scale_error * c * c.transpose();
+  covariance(2, 2) += noise.offset_mm * noise.offset_mm;
+  const Mat6 to_origin = origin_from_center(part, instance.camera_from_part);
+  covariance = to_origin * covariance * to_origin.transpose();
+  instance.free_directions.clear();
+  for (const Vector6& f : free_directions_about_center(part, instance.camera_from_part)) {
+    const Vec6 d = (to_origin * Vec6(f)).normalized();
+    const Mat6 off = Mat6::Identity() - d * d.transpose();
+    covariance = off * covariance * off;
+    instance.free_directions.push_back(Vector6(d));
+  }
+  instance.covariance = 0.5 * (covariance + covariance.transpose());
+}
+
+}  // namespace tribin
