@@ -1,0 +1,263 @@
+#include "part/surface_index.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <tuple>
+
+#include "tribin/core/error.hpp"
+
+namespace tribin {
+namespace {
+
+// Facets that meet under more than this are an edge of the part. It is the default angular deflection of Open CASCADE's
+// mesher, the coarsest that is common: a hexagonal prism (60 deg) keeps its edges, a round of 13 facets is a round.
+constexpr double kSmoothAngle = 0.5;
+// Below this an angle between facets is the rounding of float vertices, not a bend.
+constexpr double kFlatAngle = 0.2 * kDegree;
+// Two facetings of one curved surface lie at most one sagitta apart; half more for the estimate of the sagitta.
+constexpr double kSagittaFactor = 1.5;
+// A lone bend between two large plates looks like a coarse round; whatever it claims, it blurs no more than this.
+constexpr double kLargestSlack = 0.015;  // of the diameter
+constexpr int kLeafSize = 4;
+
+Vec3 nearest_on_triangle(const Vec3& a, const Vec3& ab, const Vec3& ac, const Vec3& p) {
+  // Ericson, Real-Time Collision Detection, 5.1.5: by Voronoi regions.
+  const Vec3 ap = p - a;
+  const double d1 = ab.dot(ap), d2 = ac.dot(ap);
+  if (d1 <= 0 && d2 <= 0) return a;
+  const Vec3 bp = ap - ab;
+  const double d3 = ab.dot(bp), d4 = ac.dot(bp);
+  if (d3 >= 0 && d4 <= d3) return a + ab;
+  const double vc = d1 * d4 - d3 * d2;
+  if (vc <= 0 && d1 >= 0 && d3 <= 0) return a + d1 / (d1 - d3) * ab;
+  const Vec3 cp = ap - ac;
+  const double d5 = ab.dot(cp), d6 = ac.dot(cp);
+  if (d6 >= 0 && d5 <= d6) return a + ac;
+  const double vb = d5 * d2 - d1 * d6;
+  if (vb <= 0 && d2 >= 0 && d6 <= 0) return a + d2 / (d2 - d6) * ac;
+  const double va = d3 * d6 - d5 * d4;
+  if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0) return a + ab + (d4 - d3) / ((d4 - d3) + (d5 - d6)) * (ac - ab);
+  const double scale = 1 / (va + vb + vc);
+  return a + vb * scale * ab + vc * scale * ac;
+}
+
+struct HalfEdge {
+  std::uint32_t low, high;
+  std::int32_t triangle;
+  bool operator<(const HalfEdge& other) const {
+    return std::tie(low, high, triangle) < std::tie(other.low, other.high, other.triangle);
+  }
+};
+
+}  // namespace
+
+SurfaceIndex::SurfaceIndex(const Mesh& mesh) : oriented_(mesh.oriented) {
+  std::vector<int> kept;
+  Vec3 moment = Vec3::Zero();
+  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+    const auto& t = mesh.triangles[i];
+    Triangle triangle;
+    triangle.a = mesh.vertices[t[0]].cast<double>();
+    triangle.ab = mesh.vertices[t[1]].cast<double>() - triangle.a;
+    triangle.ac = mesh.vertices[t[2]].cast<double>() - triangle.a;
+    const Vec3 cross = triangle.ab.cross(triangle.ac);
+    const double longest = std::max({triangle.ab.squaredNorm(), triangle.ac.squaredNorm(), 1e-300});
+    if (!(cross.norm() > 1e-7 * longest)) continue;  // a sliver: no area, and no normal to trust
+    triangle.area = 0.5 * cross.norm();
+    triangle.normal = cross.normalized();
+    area_mm2_ += triangle.area;
+    moment += triangle.area * (triangle.a + (triangle.ab + triangle.ac) / 3);
+    triangles_.push_back(triangle);
+    kept.push_back(static_cast<int>(i));
+  }
+  if (!(area_mm2_ > 0))
+    throw Error(ErrorCode::too_little_data,
+                "mesh '" + mesh.name + "': has no triangle with area; its symmetry needs some");
+  centroid_ = moment / area_mm2_;
+  for (const Triangle& t : triangles_) {
+    // Second moment of a triangle about the centroid: area/12 (sum over corners + 9 times the one of the middle).
+    const Vec3 a = t.a - centroid_, b = a + t.ab, c = a + t.ac, m = (a + b + c) / 3;
+    covariance_ += t.area / 12 * (a * a.transpose() + b * b.transpose() + c * c.transpose() + 9 * m * m.transpose());
+  }
+  covariance_ /= area_mm2_;
+  // Farthest from the middle, farthest from that, and so on: the largest distance of two corners, but for odd shapes.
+  Vec3 from = centroid_;
+  for (int sweep = 0; sweep < 5; ++sweep) {
+    Vec3 farthest = from;
+    for (const Triangle& t : triangles_)
+      for (const Vec3& p : {t.a, Vec3(t.a + t.ab), Vec3(t.a + t.ac)})
+        if ((p - from).squaredNorm() > (farthest - from).squaredNorm()) farthest = p;
+    if (sweep > 0) diameter_mm_ = std::max(diameter_mm_, (farthest - from).norm());
+    from = farthest;
+  }
+  measure_facets(mesh, kept);
+  build_nodes();
+}
+
+/// Finds for each facet how much the surface that it stands for may bulge from it, by the angles to its neighbours.
+void SurfaceIndex::measure_facets(const Mesh& mesh, const std::vector<int>& kept) {
+  std::vector<HalfEdge> edges;
+  edges.reserve(3 * kept.size());
+  for (std::size_t i = 0; i < kept.size(); ++i) {
+    const auto& t = mesh.triangles[kept[i]];
+    for (int k = 0; k < 3; ++k) {
+      const auto [low, high] = std::minmax(t[k], t[(k + 1) % 3]);
+      edges.push_back({low, high, static_cast<std::int32_t>(i)});
+    }
+  }
+  std::sort(edges.begin(), edges.end());
+  std::vector<float> slack_of_vertex(mesh.vertices.size(), 0);
+  const double least = mesh.chord_error_mm, most = kLargestSlack * diameter_mm_;
+  for (std::size_t i = 0; i + 1 < edges.size(); ++i) {
+    const HalfEdge &e = edges[i], &f = edges[i + 1];
+    if (e.low != f.low || e.high != f.high) continue;
+    Triangle &s = triangles_[e.triangle], &t = triangles_[f.triangle];
+    const double angle = std::atan2(s.normal.cross(t.normal).norm(), s.normal.dot(t.normal));
+    if (angle < kFlatAngle || angle > kSmoothAngle) continue;
+    const double length = (mesh.vertices[e.low] - mesh.vertices[e.high]).cast<double>().norm();
+    const double width = 2 * std::min(s.area, t.area) / std::max(length, 1e-12);
+    // A chord of length w that turns by the angle has the radius w / angle and the sagitta w^2 / (8 r).
+    const double slack = std::min(most, kSagittaFactor * std::max(least, width * angle / 8));
+    s.bend = std::max(s.bend, angle);
+    t.bend = std::max(t.bend, angle);
+    for (const auto v : {e.low, e.high}) slack_of_vertex[v] = std::max(slack_of_vertex[v], static_cast<float>(slack));
+  }
+  // By way of the vertices, so that the flat face beside a round, whose rim is cut by the same chords, gets it too.
+  for (std::size_t i = 0; i < kept.size(); ++i)
+    for (const auto v : mesh.triangles[kept[i]])
+      triangles_[i].slack_mm = std::max<double>(triangles_[i].slack_mm, slack_of_vertex[v]);
+}
+
+void SurfaceIndex::build_nodes() {
+  const int count = static_cast<int>(triangles_.size());
+  std::vector<Vec3f> middle(count);
+  for (int i = 0; i < count; ++i) {
+    const Triangle& t = triangles_[i];
+    middle[i] = (t.a + (t.ab + t.ac) / 3).cast<float>();
+  }
+  std::vector<int> order(count);
+  std::iota(order.begin(), order.end(), 0);
+  nodes_.reserve(count);
+  nodes_.push_back({{}, {}, 0, count});
+  for (std::size_t at = 0; at < nodes_.size(); ++at) {
+    const int first = nodes_[at].first, size = nodes_[at].count;
+    Vec3f low = Vec3f::Constant(std::numeric_limits<float>::max()), high = -low, middle_low = low, middle_high = high;
+    for (int i = first; i < first + size; ++i) {
+      const Triangle& t = triangles_[order[i]];
+      for (const Vec3& p : {t.a, Vec3(t.a + t.ab), Vec3(t.a + t.ac)}) {
+        low = low.cwiseMin(p.cast<float>());
+        high = high.cwiseMax(p.cast<float>());
+      }
+      middle_low = middle_low.cwiseMin(middle[order[i]]);
+      middle_high = middle_high.cwiseMax(middle[order[i]]);
+    }
+    for (int k = 0; k < 3; ++k) nodes_[at].low[k] = low[k], nodes_[at].high[k] = high[k];
+    if (size <= kLeafSize) continue;
+    int axis = 0;
+    (middle_high - middle_low).maxCoeff(&axis);
+    const int half = first + size / 2;
+    std::nth_element(order.begin() + first, order.begin() + half, order.begin() + first + size, [&](int i, int j) {
+      return middle[i][axis] != middle[j][axis] ? middle[i][axis] < middle[j][axis] : i < j;
+    });
+    nodes_[at].first = static_cast<int>(nodes_.size());
+    nodes_[at].count = 0;
+    nodes_.push_back({{}, {}, first, half - first});
+    nodes_.push_back({{}, {}, half, first + size - half});
+  }
+  std::vector<Triangle> sorted(count);
+  for (int i = 0; i < count; ++i) sorted[i] = triangles_[order[i]];
+  triangles_.swap(sorted);
+}
+
+/// Calls visit(triangle index) -> squared radius to go on with (negative: stop), nearer boxes first.
+template <class Visit>
+void SurfaceIndex::visit_within(const Vec3& p, double radius_mm, Visit&& visit) const {
+  const auto squared_distance = [&p](const Node& node) {
+    double sum = 0;
+    for (int k = 0; k < 3; ++k) {
+      const double d = std::max({node.low[k] - p[k], p[k] - node.high[k], 0.0});
+      sum += d * d;
+    }
+    return sum;
+  };
+  double limit = radius_mm * radius_mm;
+  struct Entry {
+    std::int32_t node;
+    double squared;
+  };
+  std::array<Entry, 64> stack;  // the tree is balanced: its depth is log2 of the number of triangles
+  int top = 0;
+  if (const double d = squared_distance(nodes_[0]); d <= limit) stack[top++] = {0, d};
+  while (top > 0) {
+    const Entry entry = stack[--top];
+    if (entry.squared > limit) continue;
+    const Node& node = nodes_[entry.node];
+    if (node.count > 0) {
+      for (int i = node.first; i < node.first + node.count; ++i) {
+        limit = visit(i, limit);
+        if (limit < 0) return;
+      }
+      continue;
+    }
+    Entry near{node.first, squared_distance(nodes_[node.first])};
+    Entry far{node.first + 1, squared_distance(nodes_[node.first + 1])};
+    if (far.squared < near.squared) std::swap(near, far);
+    if (far.squared <= limit) stack[top++] = far;
+    if (near.squared <= limit) stack[top++] = near;
+  }
+}
+
+bool SurfaceIndex::has_near(const Vec3& p, const Vec3& n, double radius_mm, double min_cos) const {
+  bool found = false;
+  visit_within(p, radius_mm, [&](int i, double limit) {
+    const Triangle& t = triangles_[i];
+    const double cosine = t.normal.dot(n);
+    if ((oriented_ ? cosine : std::abs(cosine)) < min_cos) return limit;
+    if ((p - nearest_on_triangle(t.a, t.ab, t.ac, p)).squaredNorm() > limit) return limit;
+    found = true;
+    return -1.0;
+  });
+  return found;
+}
+
+SurfaceHit SurfaceIndex::nearest(const Vec3& p, const Vec3& n, double radius_mm, double min_cos) const {
+  SurfaceHit hit;
+  visit_within(p, radius_mm, [&](int i, double limit) {
+    const Triangle& t = triangles_[i];
+    const double cosine = t.normal.dot(n);
+    if ((oriented_ ? cosine : std::abs(cosine)) < min_cos) return limit;
+    const Vec3 q = nearest_on_triangle(t.a, t.ab, t.ac, p);
+    const double squared = (p - q).squaredNorm();
+    if (squared > limit || (hit.triangle >= 0 && squared == limit)) return limit;
+    hit = {i, q, std::sqrt(squared)};
+    return squared;
+  });
+  return hit;
+}
+
+std::vector<SurfaceSample> SurfaceIndex::sample(int count) const {
+  std::vector<double> until(triangles_.size());
+  double sum = 0;
+  for (std::size_t i = 0; i < triangles_.size(); ++i) until[i] = sum += triangles_[i].area;
+  // R3 of Roberts, "The unreasonable effectiveness of quasirandom sequences": powers of the root of x^4 = x + 1.
+  constexpr double kRoot = 1.2207440846057596;
+  constexpr std::array<double, 3> kStep = {1 / kRoot, 1 / (kRoot * kRoot), 1 / (kRoot * kRoot * kRoot)};
+  std::vector<SurfaceSample> samples(count);
+  for (int i = 0; i < count; ++i) {
+    std::array<double, 3> r;
+    for (int k = 0; k < 3; ++k) {
+      const double x = 0.5 + (i + 1) * kStep[k];
+      r[k] = x - std::floor(x);
+    }
+    const auto it = std::upper_bound(until.begin(), until.end(), r[0] * sum);
+    const Triangle& t = triangles_[std::min<std::size_t>(it - until.begin(), triangles_.size() - 1)];
+    if (r[1] + r[2] > 1) r[1] = 1 - r[1], r[2] = 1 - r[2];
+    samples[i] = {t.a + r[1] * t.ab + r[2] * t.ac, t.normal, t.slack_mm, t.bend};
+  }
+  return samples;
+}
+
+}  // namespace tribin
