@@ -17,6 +17,7 @@ constexpr double kTelling = 0.005;
 constexpr double kScanReach = 0.02;    // half a step of the scan moves the rim by 1.7 %
 constexpr double kPolishReach = 0.03;  // the offset of near symmetries from the centroid, and half a step
 constexpr double kSameMotion = 0.03;   // rms: poses that refinement would take to one another
+constexpr double kProminence = 0.01;   // of the overlap; 1/2000 of the surface is the sampling's own step
 constexpr double kSymmetryOverlap = 0.97;
 constexpr double kMostOff = 0.001;  // of the surface, further off than the telling length
 constexpr double kNormalAngle = 20 * kDegree;
@@ -267,18 +268,29 @@ class Search {
     const std::size_t most = static_cast<std::size_t>(options_.max_self_similar);
     for (const Judged& j : judged_)
       for (const Pose& motion : {j.motion, Pose(j.motion.inverse())}) {
-        if (result_.self_similar.size() >= most || !is_new(motion)) continue;
+        if (result_.self_similar.size() >= most || !is_new(motion) || !is_peak(j)) continue;
         result_.self_similar.push_back({motion, j.overlap, discriminating_points(motion)});
       }
+  }
+
+  /// A turned part with a few features has most of itself in place after any turn; only the turns that stand out of
+  /// that count.
+  bool is_peak(const Judged& j) const {
+    const Axis axis = axis_of(j.motion);
+    const double across = surface_.covariance().trace() - axis.direction.dot(surface_.covariance() * axis.direction);
+    const double angle = kSameMotion * surface_.diameter_mm() / std::sqrt(std::max(across, 1e-12));
+    for (const double sign : {1.0, -1.0})
+      if (judge(turn(axis, sign * angle) * j.motion, j.overlap - kProminence) > j.overlap - kProminence) return false;
+    return true;
   }
 
   std::vector<Vec3f> discriminating_points(const Pose& motion) const {
     const Pose inverse = motion.inverse();
     std::vector<Vec3f> points;
-    for (const SurfaceSample& s : samples_)
+    for (const SurfaceSample& s : samples_) {
+      if (points.size() == kMostTellingPoints) break;  // a prefix of the sequence is spread as evenly as all of it
       if (overlap_of(surface_, {&s, 1}, inverse, telling_) == 0) points.push_back(s.point.cast<float>());
-    if (points.size() <= kMostTellingPoints) return points;
-    points.resize(kMostTellingPoints);  // a prefix of the sequence is spread as evenly as all of it
+    }
     return points;
   }
 
