@@ -21,6 +21,7 @@ constexpr double kFlatAngle = 0.2 * kDegree;
 constexpr double kSagittaFactor = 1.5;
 // A lone bend between two large plates looks like a coarse round; whatever it claims, it blurs no more than this.
 constexpr double kLargestSlack = 0.015;  // of the diameter
+constexpr double kSameFacet = 4;         // ratio of widths
 constexpr int kLeafSize = 4;
 
 Vec3 nearest_on_triangle(const Vec3& a, const Vec3& ab, const Vec3& ac, const Vec3& p) {
@@ -118,7 +119,10 @@ void SurfaceIndex::measure_facets(const Mesh& mesh, const std::vector<int>& kept
     const double angle = std::atan2(s.normal.cross(t.normal).norm(), s.normal.dot(t.normal));
     if (angle < kFlatAngle || angle > kSmoothAngle) continue;
     const double length = (mesh.vertices[e.low] - mesh.vertices[e.high]).cast<double>().norm();
-    const double width = 2 * std::min(s.area, t.area) / std::max(length, 1e-12);
+    const double narrow = 2 * std::min(s.area, t.area) / std::max(length, 1e-12);
+    const double wide = 2 * std::max(s.area, t.area) / std::max(length, 1e-12);
+    // The triangles of a cone's facet have its narrow and its wide end; beside a round, a wide one is the flat face.
+    const double width = wide < kSameFacet * narrow ? wide : narrow;
     // A chord of length w that turns by the angle has the radius w / angle and the sagitta w^2 / (8 r).
     const double slack = std::min(most, kSagittaFactor * std::max(least, width * angle / 8));
     s.bend = std::max(s.bend, angle);
