@@ -1,0 +1,38 @@
+# Optional libraries, each switched on by its package being found. A missing one is named in the configure summary, and
+# the commands that need it say which package to install.
+
+# tribin::cad_exchange: STEP and IGES by Open CASCADE.
+find_package(OpenCASCADE CONFIG QUIET)  # its version file accepts its own version only
+if(OpenCASCADE_FOUND)
+  tribin_stage_sources(TRIBIN_CAD_EXCHANGE_SOURCES cad_exchange)
+  add_library(tribin_cad_exchange ${TRIBIN_CAD_EXCHANGE_SOURCES})
+  add_library(tribin::cad_exchange ALIAS tribin_cad_exchange)
+  set_target_properties(tribin_cad_exchange PROPERTIES EXPORT_NAME cad_exchange)
+  target_link_libraries(tribin_cad_exchange PUBLIC tribin PRIVATE
+    TKSTEP TKSTEPBase TKSTEPAttr TKSTEP209 TKIGES TKXSBase TKShHealing TKMesh TKTopAlgo TKGeomAlgo TKBRep TKGeomBase
+    TKG3d TKG2d TKMath TKernel)
+  # SYSTEM: warnings in Open CASCADE's headers are not ours.
+  target_include_directories(tribin_cad_exchange SYSTEM PRIVATE ${OpenCASCADE_INCLUDE_DIR})
+  target_include_directories(tribin_cad_exchange PRIVATE ${PROJECT_SOURCE_DIR}/src)
+  target_compile_definitions(tribin_cad_exchange INTERFACE TRIBIN_WITH_CAD_EXCHANGE)
+  message(STATUS "tribin: STEP and IGES: Open CASCADE ${OpenCASCADE_VERSION}")
+else()
+  message(STATUS "tribin: STEP and IGES: off (install libocct-data-exchange-dev)")
+endif()
+
+# tribin::sim: the simulated camera, by Embree.
+find_package(embree 3 CONFIG QUIET)
+if(embree_FOUND)
+  tribin_stage_sources(TRIBIN_SIM_SOURCES sim)
+  if(TRIBIN_SIM_SOURCES)
+    add_library(tribin_sim ${TRIBIN_SIM_SOURCES})
+    add_library(tribin::sim ALIAS tribin_sim)
+    set_target_properties(tribin_sim PROPERTIES EXPORT_NAME sim)
+    target_link_libraries(tribin_sim PUBLIC tribin PRIVATE embree nlohmann_json::nlohmann_json PNG::PNG)
+    target_include_directories(tribin_sim PRIVATE ${PROJECT_SOURCE_DIR}/src)
+    target_compile_definitions(tribin_sim INTERFACE TRIBIN_WITH_SIM)
+    message(STATUS "tribin: simulation: Embree ${embree_VERSION}")
+  endif()
+else()
+  message(STATUS "tribin: simulation: off (install libembree-dev)")
+endif()

@@ -1,0 +1,134 @@
+#include <BRepAdaptor_Surface.hxx>
+#include <BRepGProp.hxx>
+#include <BRepTools.hxx>
+#include <BRep_Tool.hxx>
+#include <GProp_GProps.hxx>
+#include <TopoDS.hxx>
+#include <TopoDS_Face.hxx>
+#include <cmath>
+#include <gp_Cone.hxx>
+#include <gp_Cylinder.hxx>
+#include <gp_Pln.hxx>
+#include <gp_Sphere.hxx>
+#include <gp_Torus.hxx>
+
+#include "cad_exchange/recognize_surface.hpp"
+#include "cad_exchange/shape_mesh.hpp"
+
+namespace tribin::detail {
+namespace {
+
+Vec3 vec(const gp_XYZ& p) { return {p.X(), p.Y(), p.Z()}; }
+Vec3 vec(const gp_Pnt& p) { return vec(p.XYZ()); }
+Vec3 vec(const gp_Dir& d) { return vec(d.XYZ()); }
+
+/// The surface at (u, v) with the outward normal; zero normal where the surface is singular.
+SurfacePoint surface_point(const TopoDS_Face& face, const BRepAdaptor_Surface& surface, double u, double v) {
+  gp_Pnt p;
+  gp_Vec du, dv;
+  surface.D1(u, v, p, du, dv);
+  const gp_Vec n = du.Crossed(dv);
+  if (n.Magnitude() < 1e-12) return {vec(p), Vec3::Zero()};
+  // The flag says on which side of du x dv the material lies. du x dv itself turns with a left-handed surface frame, so
+  // that the two together are right for holes whatever writer made the file.
+  const double sign = face.Orientation() == TopAbs_REVERSED ? -1.0 : 1.0;
+  return {vec(p), vec(n.XYZ()) * (sign / n.Magnitude())};
+}
+
+/// Points on a grid over the face's parameter range, without singular ones.
+std::vector<SurfacePoint> surface_grid(const TopoDS_Face& face, const BRepAdaptor_Surface& surface, int steps) {
+  double u0, u1, v0, v1;
+  BRepTools::UVBounds(face, u0, u1, v0, v1);
+  std::vector<SurfacePoint> points;
+  for (int i = 0; i <= steps; ++i)
+    for (int j = 0; j <= steps; ++j) {
+      const SurfacePoint s = surface_point(face, surface, u0 + (u1 - u0) * i / steps, v0 + (v1 - v0) * j / steps);
+      if (s.normal.norm() > 0.5) points.push_back(s);
+    }
+  return points;
+}
+
+Vec3 across(const CadFace& f, const Vec3& p) {
+  const Vec3 d = p - f.point;
+  return d - d.dot(f.axis) * f.axis;
+}
+
+/// The direction away from the axis, the centre or the tube's centre line at a point of the surface.
+Vec3 outwards(const CadFace& f, const Vec3& p) {
+  switch (f.type) {
+    case SurfaceType::cylinder:
+    case SurfaceType::cone:
+      return across(f, p);
+    case SurfaceType::sphere:
+      return p - f.point;
+    case SurfaceType::torus: {
+      const Vec3 radial = across(f, p);
+      return radial.norm() > 0 ? Vec3(p - (f.point + radial.normalized() * f.radius_mm)) : Vec3(Vec3::Zero());
+    }
+    default:
+      return Vec3::Zero();
+  }
+}
+
+/// Type and parameters, without what depends on the side of the material.
+CadFace bare_face(const TopoDS_Face& face, const BRepAdaptor_Surface& surface, double tolerance) {
+  CadFace f;
+  switch (surface.GetType()) {
+    case GeomAbs_Plane:
+      f.type = SurfaceType::plane;
+      f.axis = vec(surface.Plane().Axis().Direction());
+      f.point = vec(surface.Plane().Location());
+      return f;
+    case GeomAbs_Cylinder:
+      f.type = SurfaceType::cylinder;
+      f.axis = vec(surface.Cylinder().Axis().Direction());
+      f.point = vec(surface.Cylinder().Location());
+      f.radius_mm = surface.Cylinder().Radius();
+      return f;
+    case GeomAbs_Cone:
+      f.type = SurfaceType::cone;
+      f.axis = vec(surface.Cone().Axis().Direction());
+      f.point = vec(surface.Cone().Apex());
+      f.half_angle = std::abs(surface.Cone().SemiAngle());
+      return f;
+    case GeomAbs_Sphere:
+      f.type = SurfaceType::sphere;
+      f.point = vec(surface.Sphere().Location());
+      f.radius_mm = surface.Sphere().Radius();
+      return f;
+    case GeomAbs_Torus:
+      f.type = SurfaceType::torus;
+      f.axis = vec(surface.Torus().Axis().Direction());
+      f.point = vec(surface.Torus().Location());
+      f.radius_mm = surface.Torus().MajorRadius();
+      f.minor_radius_mm = surface.Torus().MinorRadius();
+      return f;
+    default:
+      // Open CASCADE's own conversion (ShapeCustom::SweptToElementary) crashes on some files and knows no splines.
+      return recognize_surface(surface_grid(face, surface, 8), tolerance);
+  }
+}
+
+}  // namespace
+
+CadFace exact_face(const TopoDS_Shape& shape, int id, double tolerance) {
+  const TopoDS_Face& face = TopoDS::Face(shape);
+  if (BRep_Tool::Surface(face).IsNull()) return {.id = id};
+  const BRepAdaptor_Surface surface(face);
+  CadFace result = bare_face(face, surface, tolerance);
+  result.id = id;
+  GProp_GProps properties;
+  BRepGProp::SurfaceProperties(face, properties);
+  result.area_mm2 = std::abs(properties.Mass());
+  // Odd steps: the middle of a face is where a pole or an apex likes to lie.
+  const std::vector<SurfacePoint> points = surface_grid(face, surface, 5);
+  if (points.empty()) return result;
+  const SurfacePoint at = points[points.size() / 2];
+  if (result.type == SurfaceType::plane && result.axis.dot(at.normal) < 0) result.axis = -result.axis;
+  // The axis points from the apex into the nappe on which the face lies.
+  if (result.type == SurfaceType::cone && result.axis.dot(at.position - result.point) < 0) result.axis = -result.axis;
+  result.concave = at.normal.dot(outwards(result, at.position)) < 0;
+  return result;
+}
+
+}  // namespace tribin::detail
