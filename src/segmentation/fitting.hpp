@@ -1,0 +1,63 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "tribin/segmentation/primitives.hpp"
+
+namespace tribin::segmentation_detail {
+
+using Indices = std::vector<std::uint32_t>;
+
+/// A surface that distances can be measured to. One struct for all types: plane, or a surface of revolution.
+struct Surface {
+  PrimitiveType type = PrimitiveType::plane;
+  Vec3 axis = Vec3::UnitZ();  ///< plane: normal on the side of the surfels' normals
+  Vec3 point = Vec3::Zero();  ///< plane: on it; cylinder, cone: on the axis, where `radius` holds; sphere: centre
+  double radius = 0;          ///< mm
+  double half_angle = 0;      ///< cone: the radius grows by tan(half_angle) along the axis [rad], any sign
+  bool concave = false;
+
+  /// Signed distance [mm]: geometric, along the surface's normal; > 0 outside of the radius or on the normal's side.
+  double distance(const Vec3& p) const;
+  /// Normal at the foot of p, on the side of the surfels' normals (towards the axis where concave).
+  Vec3 normal(const Vec3& p) const;
+};
+
+/// Result of a fit.
+struct Fit {
+  Surface surface;
+  Matrix6 covariance = Matrix6::Zero();  ///< order of Primitive::covariance
+  double scale = 1;                      ///< robust size of the residuals in sigmas of a surfel, >= 1
+  double rms_sigma = 0;                  ///< rms of the inliers' residuals in sigmas
+  bool valid = false;
+};
+
+struct FitOptions {
+  bool hold_radius = false;  ///< keep surface.radius
+  bool cone = false;         ///< let the half angle go
+  double start_mm = 0;       ///< robust scale to start at, 0 = already close
+  int max_surfels = 4000;    ///< fit every k-th beyond that
+};
+
+/// Least squares of a plane to the surfels' positions, robust, weights 1 / sigma^2.
+Fit fit_plane(const Surfels& surfels, std::span<const std::uint32_t> support);
+
+/// Levenberg-Marquardt on geometric distances to a cylinder, cone or sphere with a Geman-McClure kernel that shrinks
+/// from `start_mm` to the noise. \param start  a surface near the solution.
+Fit fit_round(const Surfels& surfels, std::span<const std::uint32_t> support, const Surface& start,
+              const FitOptions& options = {});
+
+/// The circle of revolution that normals across a known axis point at: centre and radius, closed form.
+/// \return a cylinder; radius <= 0 where the normals do not meet.
+Surface cylinder_from_normals(const Surfels& surfels, std::span<const std::uint32_t> support, const Vec3& axis);
+/// The same in space, for a sphere.
+Surface sphere_from_normals(const Surfels& surfels, std::span<const std::uint32_t> support);
+/// A cone from the circle that its normals draw on the unit sphere, and the apex that their planes share.
+Surface cone_from_normals(const Surfels& surfels, std::span<const std::uint32_t> support);
+
+/// Robust size of residuals in sigmas: 1.4826 MAD about 0, at least 1, at most what one raw point scatters.
+double residual_scale(const Surfels& surfels, std::span<const std::uint32_t> support, const Surface& surface);
+
+}  // namespace tribin::segmentation_detail

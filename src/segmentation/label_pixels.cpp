@@ -1,0 +1,73 @@
+#include <algorithm>
+#include <cmath>
+
+#include "segmentation/fitting.hpp"
+#include "tribin/core/error.hpp"
+#include "tribin/core/parallel.hpp"
+
+namespace tribin {
+namespace {
+
+using namespace segmentation_detail;
+
+Surface surface_of(const Primitive& p) {
+  Surface s;
+  s.type = p.type;
+  s.axis = p.axis;
+  s.point = p.point;
+  s.radius = p.radius_mm;
+  s.half_angle = p.half_angle;
+  s.concave = p.concave;
+  return s;
+}
+
+}  // namespace
+
+Image<std::uint16_t> label_pixels(const Primitives& primitives, const Surfels& surfels) {
+  TRIBIN_ASSERT(surfels.scan != nullptr);
+  const Scan& scan = *surfels.scan;
+  Image<std::uint16_t> labels(scan.width(), scan.height(), 0);
+  std::vector<Surface> surfaces;
+  for (const Primitive& p : primitives.items) surfaces.push_back(surface_of(p));
+  const int n = surfels.cell_px;
+  const Image<std::int32_t>& cells = surfels.surfel_of_cell;
+  const auto label_of_cell = [&](int column, int row) {
+    if (!cells.contains(column, row) || cells(column, row) < 0) return 0;
+    return primitives.label_of_surfel[static_cast<std::size_t>(cells(column, row))];
+  };
+  parallel_ranges(scan.height(), 64, [&](int begin, int end) {
+    for (int v = begin; v < end; ++v)
+      for (int u = 0; u < scan.width(); ++u) {
+        if (!std::isfinite(scan.z_mm(u, v))) continue;
+        const int column = u / n, row = v / n;
+        // The own cell first; pixels of refused cells (edges) may belong to a neighbouring cell's primitive.
+        int candidates[9], count = 0;
+        const int own = label_of_cell(column, row);
+        if (own > 0) candidates[count++] = own;
+        const bool refused = !cells.contains(column, row) || cells(column, row) < 0;
+        if (refused || own == 0)
+          for (int dv = -1; dv <= 1; ++dv)
+            for (int du = -1; du <= 1; ++du) {
+              const int label = label_of_cell(column + du, row + dv);
+              if (label > 0 && std::find(candidates, candidates + count, label) == candidates + count)
+                candidates[count++] = label;
+            }
+        if (count == 0) continue;
+        const int tile_u = std::min(column / 8, surfels.local_sigma_mm.width - 1);
+        const int tile_v = std::min(row / 8, surfels.local_sigma_mm.height - 1);
+        const Vec3 p = scan.point(u, v);
+        double best = 3.0 * surfels.local_sigma_mm(tile_u, tile_v);
+        for (int k = 0; k < count; ++k) {
+          const Surface& s = surfaces[static_cast<std::size_t>(candidates[k] - 1)];
+          // Along the ray the noise is sigma; along the normal it is seen at its cosine.
+          const double distance = std::abs(s.distance(p)) / std::max(0.2, std::abs(s.normal(p).dot(p)) / p.z());
+          if (distance > best) continue;
+          best = distance;
+          labels(u, v) = static_cast<std::uint16_t>(candidates[k]);
+        }
+      }
+  });
+  return labels;
+}
+
+}  // namespace tribin

@@ -1,0 +1,118 @@
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+#include "segmentation/spaces.hpp"
+
+namespace tribin::segmentation_detail {
+namespace {
+
+constexpr double kGather = 8.0 * kDegree;  // rulings of one axis: a peak's width with its noise
+constexpr int kWidths = 3;                 // kernels of 1, 2 and 3 rings for rulings of growing noise
+
+/// sd of a ruling's direction [rad]: the off-diagonal noise of the shape operator over the difference of the
+/// curvatures.
+double sigma_ruling(const Surfels& s, std::uint32_t i) {
+  return 0.5 * s.sigma_curvature[i] / std::max(1e-9f, std::abs(s.curvature1[i] - s.curvature2[i]));
+}
+
+/// One kernel step on the sphere: every bin shares its votes with those within 5 deg.
+std::vector<float> spread(const DirectionBins& bins, const std::vector<float>& votes) {
+  std::vector<float> out(votes.size(), 0.0f);
+  for (std::size_t b = 0; b < votes.size(); ++b) {
+    if (votes[b] == 0) continue;
+    const auto ring = bins.neighbours(static_cast<int>(b));
+    for (std::uint32_t k : ring) out[k] += votes[b] / static_cast<float>(ring.size());
+  }
+  return out;
+}
+
+/// Ruling votes of all free ruled surfels, each with a kernel of its own width.
+std::vector<float> vote_rulings(const Scene& scene, const std::vector<std::uint8_t>& dead) {
+  const Surfels& s = scene.surfels;
+  const DirectionBins& bins = axis_bins();
+  std::vector<float> by_width[kWidths];
+  for (auto& v : by_width) v.assign(bins.center.size(), 0.0f);
+  for (std::uint32_t i = 0; i < s.size(); ++i) {
+    if (!scene.free(i) || dead[i] || s.shape[i] != SurfelShape::ruled) continue;
+    const double sigma = sigma_ruling(s, i);
+    const int width = sigma < 3 * kDegree ? 0 : sigma < 6 * kDegree ? 1 : 2;
+    by_width[width][bins.find(s.direction2[i])] += s.area_mm2[i];
+  }
+  std::vector<float> total = by_width[kWidths - 1];
+  for (int w = kWidths - 1; w >= 0; --w) {
+    total = spread(bins, total);
+    if (w > 0)
+      for (std::size_t b = 0; b < total.size(); ++b) total[b] += by_width[w - 1][b];
+  }
+  return total;
+}
+
+}  // namespace
+
+void find_cylinders(Scene& scene, const Limits& limits, HoughSpaces& spaces, std::vector<Found>& found) {
+  const Surfels& s = scene.surfels;
+  const DirectionBins& bins = axis_bins();
+  std::vector<std::uint8_t> dead(s.size(), 0);
+  if (spaces.parameter.empty()) spaces.parameter = vote_rulings(scene, dead);
+  const std::size_t least = std::max<std::size_t>(4, limits.min_surfels / 3);
+
+  constexpr int kMaxPeaks = 400;  // each kills its members, so this only guards against a fault
+  for (int round = 0; round < kMaxPeaks; ++round) {
+    const std::vector<float> votes = vote_rulings(scene, dead);
+    const auto best = static_cast<std::size_t>(std::max_element(votes.begin(), votes.end()) - votes.begin());
+    // The kernels spread a cylinder's votes over some twenty bins.
+    if (votes[best] < 0.02 * limits.min_area_mm2) break;
+    Vec3 axis = bins.center[best].cast<double>();
+    Indices members;
+    double gathered = 0;
+    for (int shift = 0; shift < 4; ++shift) {
+      Matrix3 scatter = Matrix3::Zero();
+      members.clear();
+      gathered = 0;
+      for (std::uint32_t i = 0; i < s.size(); ++i) {
+        if (!scene.free(i) || dead[i] || s.shape[i] != SurfelShape::ruled) continue;
+        const Vec3 d = s.direction2[i].cast<double>();
+        const double gate = kGather + 2.0 * std::min(sigma_ruling(s, i), 6 * kDegree);
+        if (std::abs(d.dot(axis)) < std::cos(gate)) continue;
+        if (std::abs(s.normal[i].cast<double>().dot(axis)) > std::sin(gate)) continue;
+        members.push_back(i);
+        scatter += s.area_mm2[i] * d * d.transpose();
+        gathered += s.area_mm2[i];
+      }
+      if (members.empty()) break;
+      const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver{Eigen::Matrix3d(scatter)};
+      axis = solver.eigenvectors().col(2);
+    }
+    if (axis.z() < 0) axis = -axis;
+    HoughPeak peak;
+    peak.parameter_space = true;
+    peak.direction = axis;
+    peak.votes = gathered;
+    bool any = false;
+    for (int side = 0; side < 2; ++side) {  // convex and concave surfaces may touch: never one component
+      Indices one_side;
+      for (std::uint32_t i : members)
+        if ((s.curvature1[i] > 0) == (side == 0)) one_side.push_back(i);
+      for (const Indices& component : components(scene, one_side, least)) {
+        Indices left = component;
+        // A component may hold several cylinders: take the best, go on with the rest.
+        while (left.size() >= least) {
+          std::optional<Found> next = explain_round(scene, left, axis, limits);
+          if (!next) break;
+          next->peak = static_cast<int>(spaces.peaks.size());
+          take(scene, found, std::move(*next));
+          any = true;
+          std::erase_if(left, [&](std::uint32_t i) { return !scene.free(i); });
+          const std::vector<Indices> parts = components(scene, left, least);
+          left = parts.empty() ? Indices{} : parts.front();
+        }
+      }
+    }
+    if (any) spaces.peaks.push_back(peak);
+    for (std::uint32_t i : members) dead[i] = 1;
+    if (members.empty()) break;
+  }
+}
+
+}  // namespace tribin::segmentation_detail

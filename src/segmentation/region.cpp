@@ -1,0 +1,136 @@
+#include "segmentation/region.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tribin::segmentation_detail {
+namespace {
+
+constexpr int kReach = 2;  // cells: one rejected cell may lie between
+
+/// Calls visit(j) for the neighbours of i, then bridge(j) for surfels up to kReach cells away that are no neighbours.
+template <class Visit, class Bridge>
+void around(const Surfels& s, std::uint32_t i, Visit&& visit, Bridge&& bridge) {
+  for (std::uint32_t k = s.neighbour_begin[i]; k < s.neighbour_begin[i + 1]; ++k) visit(s.neighbours[k]);
+  if (s.scan == nullptr) return;
+  const int width = s.surfel_of_cell.width;
+  const int column = static_cast<int>(s.cell[i]) % width, row = static_cast<int>(s.cell[i]) / width;
+  if (s.neighbour_begin[i + 1] - s.neighbour_begin[i] == 8) return;  // surrounded: nothing to bridge
+  for (int dv = -kReach; dv <= kReach; ++dv)
+    for (int du = -kReach; du <= kReach; ++du) {
+      if (std::max(std::abs(du), std::abs(dv)) < kReach || !s.surfel_of_cell.contains(column + du, row + dv)) continue;
+      // Only over a gap: the cell between has no surfel.
+      if (s.surfel_of_cell(column + du / 2, row + dv / 2) >= 0) continue;
+      const std::int32_t j = s.surfel_of_cell(column + du, row + dv);
+      if (j >= 0) bridge(static_cast<std::uint32_t>(j));
+    }
+}
+
+}  // namespace
+
+Scene::Scene(const Surfels& s) : surfels(s), label(s.size(), 0), mark(s.size(), 0) {
+  std::vector<float> areas(s.area_mm2);
+  if (areas.empty()) return;
+  std::nth_element(areas.begin(), areas.begin() + static_cast<std::ptrdiff_t>(areas.size() / 2), areas.end());
+  cell_mm = std::sqrt(areas[areas.size() / 2]);
+}
+
+std::vector<Indices> components(Scene& scene, std::span<const std::uint32_t> members, std::size_t least) {
+  const Surfels& s = scene.surfels;
+  const std::uint32_t waiting = ++scene.tick, done = ++scene.tick;
+  for (std::uint32_t i : members) scene.mark[i] = waiting;
+  std::vector<Indices> out;
+  Indices queue;
+  for (std::uint32_t first : members) {
+    if (scene.mark[first] != waiting) continue;
+    queue.assign(1, first);
+    scene.mark[first] = done;
+    for (std::size_t at = 0; at < queue.size(); ++at) {
+      const std::uint32_t i = queue[at];
+      const auto take = [&](std::uint32_t j) {
+        if (scene.mark[j] != waiting) return;
+        scene.mark[j] = done;
+        queue.push_back(j);
+      };
+      around(s, i, take, [&](std::uint32_t j) {
+        if (scene.mark[j] != waiting) return;
+        const Vec3f mean = (s.normal[i] + s.normal[j]).normalized();
+        const double offset = std::abs(mean.dot(s.position[j] - s.position[i]));
+        const double sigma = std::hypot(s.sigma_mm[i], s.sigma_mm[j]);
+        if (offset < 0.15 * scene.cell_mm + 3.0 * sigma) take(j);
+      });
+    }
+    if (queue.size() >= least) out.push_back(queue);
+  }
+  std::stable_sort(out.begin(), out.end(), [](const Indices& a, const Indices& b) { return a.size() > b.size(); });
+  return out;
+}
+
+bool fits(const Surfels& s, std::uint32_t i, const Surface& surface, double scale, double slack) {
+  const Vec3 p = s.position[i].cast<double>();
+  if (std::abs(surface.distance(p)) > 4.0 * scale * s.sigma_mm[i]) return false;
+  const double limit = std::min(4.0 * scale * s.sigma_normal[i] + slack, 60.0 * kDegree);
+  return surface.normal(p).dot(s.normal[i].cast<double>()) > std::cos(limit);
+}
+
+Indices grow(Scene& scene, const Surface& surface, std::span<const std::uint32_t> seed, double scale, double slack) {
+  const Surfels& s = scene.surfels;
+  const std::uint32_t seen = ++scene.tick;
+  Indices support;
+  const auto consider = [&](std::uint32_t j) {
+    if (scene.mark[j] == seen) return;
+    scene.mark[j] = seen;
+    if (scene.free(j) && fits(s, j, surface, scale, slack)) support.push_back(j);
+  };
+  for (std::uint32_t i : seed) consider(i);
+  for (std::size_t at = 0; at < support.size(); ++at) around(s, support[at], consider, consider);
+  return support;
+}
+
+double residual_correlation(Scene& scene, std::span<const std::uint32_t> support, const Surface& surface) {
+  const Surfels& s = scene.surfels;
+  const std::uint32_t inside = ++scene.tick;
+  for (std::uint32_t i : support) scene.mark[i] = inside;
+  const auto residual = [&](std::uint32_t i) { return surface.distance(s.position[i].cast<double>()) / s.sigma_mm[i]; };
+  double products = 0, squares = 0;
+  for (std::uint32_t i : support) {
+    const double r = residual(i);
+    for (std::uint32_t k = s.neighbour_begin[i]; k < s.neighbour_begin[i + 1]; ++k) {
+      const std::uint32_t j = s.neighbours[k];
+      if (scene.mark[j] != inside) continue;
+      products += r * residual(j);
+      squares += r * r;
+    }
+  }
+  return squares > 0 ? products / squares : 0;
+}
+
+double smooth_rim_share(Scene& scene, std::span<const std::uint32_t> support) {
+  const Surfels& s = scene.surfels;
+  const std::uint32_t inside = ++scene.tick;
+  for (std::uint32_t i : support) scene.mark[i] = inside;
+  std::size_t rim = 0, smooth = 0;
+  const float cos_smooth = static_cast<float>(std::cos(12.0 * kDegree));  // a cell of width w bends by w / R
+  for (std::uint32_t i : support) {
+    int neighbours = 0, outside_free = 0, outside = 0;
+    for (std::uint32_t k = s.neighbour_begin[i]; k < s.neighbour_begin[i + 1]; ++k) {
+      const std::uint32_t j = s.neighbours[k];
+      ++neighbours;
+      if (scene.mark[j] == inside) continue;
+      ++outside;
+      outside_free += scene.free(j) && s.normal[i].dot(s.normal[j]) > cos_smooth;
+    }
+    if (outside == 0 && (neighbours == 8 || s.scan == nullptr)) continue;
+    ++rim;
+    smooth += outside_free >= 2;
+  }
+  return rim > 0 ? static_cast<double>(smooth) / static_cast<double>(rim) : 0;
+}
+
+double area_of(const Surfels& surfels, std::span<const std::uint32_t> support) {
+  double area = 0;
+  for (std::uint32_t i : support) area += surfels.area_mm2[i];
+  return area;
+}
+
+}  // namespace tribin::segmentation_detail

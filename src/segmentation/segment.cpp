@@ -1,0 +1,132 @@
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "segmentation/spaces.hpp"
+#include "tribin/core/error.hpp"
+#include "tribin/segmentation/primitives.hpp"
+
+namespace tribin {
+namespace {
+
+using namespace segmentation_detail;
+
+Limits limits_of(const Surfels& surfels, const Scene& scene, const SegmentationOptions& options) {
+  constexpr std::size_t kCells = 30;  // the least that holds a plane's or a cylinder's direction
+  Limits limits;
+  limits.radii_mm = options.radii_mm;
+  for (double radius : limits.radii_mm)
+    if (!(radius > 0))
+      throw Error(ErrorCode::bad_option, "a radius of " + std::to_string(radius) + " mm was asked for");
+  std::sort(limits.radii_mm.begin(), limits.radii_mm.end());
+  const bool cad = surfels.mesh != nullptr;
+  const double cell = scene.cell_mm * scene.cell_mm;
+  limits.min_area_mm2 = options.min_area_mm2 > 0 ? options.min_area_mm2 : cad ? 0.0 : kCells * cell;
+  limits.min_surfels = cad ? 1 : std::max<std::size_t>(8, static_cast<std::size_t>(0.5 * limits.min_area_mm2 / cell));
+  // Surfels call "ruled" what bends by more than half of 1 / max_radius of their options: twice the default of 100 mm.
+  limits.max_radius_mm = 250;
+  for (double radius : limits.radii_mm) limits.max_radius_mm = std::max(limits.max_radius_mm, 1.5 * radius);
+  return limits;
+}
+
+/// Area of the surfels' normals in IJK space, for people to look at.
+void fill_ijk(const Surfels& s, HoughSpaces& spaces) {
+  const DirectionBins& bins = ijk_bins();
+  spaces.ijk_all.assign(bins.center.size(), 0.0f);
+  spaces.ijk_flat = spaces.ijk_curved = spaces.ijk_all;
+  for (std::size_t i = 0; i < s.size(); ++i) {
+    const int bin = bins.find(s.normal[i]);
+    spaces.ijk_all[bin] += s.area_mm2[i];
+    if (s.shape[i] == SurfelShape::flat) spaces.ijk_flat[bin] += s.area_mm2[i];
+    if (s.shape[i] == SurfelShape::ruled) spaces.ijk_curved[bin] += s.area_mm2[i];
+  }
+}
+
+double rms_mm(const Surfels& s, const Indices& support, const Surface& surface) {
+  double squares = 0;
+  for (std::uint32_t i : support) squares += std::pow(surface.distance(s.position[i].cast<double>()), 2);
+  return std::sqrt(squares / static_cast<double>(support.size()));
+}
+
+Primitive primitive_of(const Surfels& s, Found& found) {
+  const Surface& surface = found.fit.surface;
+  Primitive p;
+  p.type = surface.type;
+  p.axis = surface.axis;
+  p.point = surface.point;
+  p.concave = surface.concave;
+  p.arc = found.arc;
+  p.radius_from_cad = found.radius_from_cad;
+  p.covariance = found.fit.covariance;
+  p.peak = found.peak;
+  std::sort(found.support.begin(), found.support.end());
+  p.surfels = found.support;
+  p.area_mm2 = area_of(s, found.support);
+  p.rms_mm = rms_mm(s, found.support, surface);
+  for (std::uint32_t i : found.support) p.points += static_cast<int>(s.points[i]);
+  if (p.type == PrimitiveType::plane) {
+    p.offset_mm = p.axis.dot(p.point);
+    return p;
+  }
+  p.radius_mm = surface.radius;
+  if (p.type == PrimitiveType::sphere) return p;
+  if (p.type == PrimitiveType::cylinder && p.axis.z() < 0) p.axis = -p.axis;
+  if (p.type == PrimitiveType::cone) {
+    if (surface.half_angle < 0) p.axis = -p.axis;  // from the apex into the cone
+    p.half_angle = std::abs(surface.half_angle);
+    p.point -= p.axis * (surface.radius / std::tan(p.half_angle));
+    p.radius_mm = 0;
+  }
+  p.extent_min = 1e300;
+  p.extent_max = -1e300;
+  for (std::uint32_t i : found.support) {
+    const double t = p.axis.dot(s.position[i].cast<double>() - p.point);
+    p.extent_min = std::min(p.extent_min, t);
+    p.extent_max = std::max(p.extent_max, t);
+  }
+  if (p.type == PrimitiveType::cylinder) {
+    const double middle = 0.5 * (p.extent_min + p.extent_max);
+    p.point += p.axis * middle;
+    p.extent_min -= middle;
+    p.extent_max -= middle;
+  }
+  return p;
+}
+
+}  // namespace
+
+const char* name_of(PrimitiveType type) {
+  constexpr const char* kNames[] = {"plane", "cylinder", "cone", "sphere"};
+  return kNames[static_cast<int>(type)];
+}
+
+Primitives segment(const Surfels& surfels, const SegmentationOptions& options) {
+  Primitives out;
+  Scene scene(surfels);
+  const Limits limits = limits_of(surfels, scene, options);
+  fill_ijk(surfels, out.spaces);
+
+  // Back and forth among the spaces on what is left, until a round explains nothing more.
+  std::vector<Found> found;
+  constexpr int kRounds = 3;
+  for (int round = 0; round < kRounds; ++round) {
+    const std::size_t before = found.size();
+    find_planes(scene, limits, out.spaces, found);
+    find_cylinders(scene, limits, out.spaces, found);
+    find_cones_and_spheres(scene, limits, found);
+    if (found.size() == before) break;
+  }
+
+  // Largest first.
+  for (Found& f : found) out.items.push_back(primitive_of(surfels, f));
+  std::stable_sort(out.items.begin(), out.items.end(),
+                   [](const Primitive& a, const Primitive& b) { return a.area_mm2 > b.area_mm2; });
+  out.label_of_surfel.assign(surfels.size(), 0);
+  for (std::size_t i = 0; i < out.items.size(); ++i) {
+    out.items[i].id = static_cast<int>(i + 1);
+    for (std::uint32_t k : out.items[i].surfels) out.label_of_surfel[k] = out.items[i].id;
+  }
+  return out;
+}
+
+}  // namespace tribin

@@ -1,0 +1,181 @@
+#include <algorithm>
+#include <cmath>
+
+#include "segmentation/spaces.hpp"
+
+namespace tribin::segmentation_detail {
+namespace {
+
+constexpr double kRoundSlack = 4.0 * kDegree;  // the quadric's gradient on a tight radius, cubic terms
+constexpr double kShortArc = 60.0 * kDegree;   // below, a free radius means little: algorithms.md section 10
+constexpr double kMaxRmsSigma = 3.5;           // rms of cell means in sigmas: right ones 1-1.5, compromises > 4
+
+/// Arc of the support about the axis: the circle less its largest gap.
+double arc_of(const Surfels& s, const Indices& support, const Surface& surface) {
+  Vec3 u, v;
+  orthonormal_basis(surface.axis, u, v);
+  std::vector<double> angles;
+  angles.reserve(support.size());
+  for (std::uint32_t i : support) {
+    const Vec3 q = s.position[i].cast<double>() - surface.point;
+    angles.push_back(std::atan2(q.dot(v), q.dot(u)));
+  }
+  std::sort(angles.begin(), angles.end());
+  double gap = angles.front() + 2 * kPi - angles.back();
+  for (std::size_t i = 1; i < angles.size(); ++i) gap = std::max(gap, angles[i] - angles[i - 1]);
+  return 2 * kPi - gap;
+}
+
+struct Candidate {
+  Fit fit;
+  Indices support;
+  bool from_cad = false;
+};
+
+/// Fit, grow, fit: from a component to all that lies on its surface.
+std::optional<Candidate> settle(Scene& scene, const Indices& component, const Surface& start, FitOptions options,
+                                const Limits& limits) {
+  Candidate c;
+  options.max_surfels = 600;  // the place first
+  c.fit = fit_round(scene.surfels, component, start, options);
+  options.start_mm = 0;
+  for (int round = 0; round < 2; ++round) {
+    if (!c.fit.valid || c.fit.surface.radius > limits.max_radius_mm) return std::nullopt;
+    c.support = grow(scene, c.fit.surface, component, c.fit.scale, kRoundSlack);
+    if (c.support.size() < limits.min_surfels) return std::nullopt;
+    options.max_surfels = round == 0 ? 600 : 4000;
+    c.fit = fit_round(scene.surfels, c.support, c.fit.surface, options);
+  }
+  if (!c.fit.valid) return std::nullopt;
+  return c;
+}
+
+std::size_t kept(const Scene& scene, const Indices& component, const Candidate& c) {
+  std::size_t count = 0;
+  for (std::uint32_t i : component) count += fits(scene.surfels, i, c.fit.surface, c.fit.scale, kRoundSlack);
+  return count;
+}
+
+/// Tests that every surface of revolution must pass before it explains anything.
+bool accepted(Scene& scene, const Indices& component, const Candidate& c, double arc, const Limits& limits) {
+  const Surfels& s = scene.surfels;
+  if (area_of(s, c.support) < limits.min_area_mm2) return false;
+  if (c.fit.rms_sigma > kMaxRmsSigma) return false;
+  // Most of what voted must lie on it; else it is a compromise between surfaces.
+  if (2 * kept(scene, component, c) < component.size()) return false;
+  // The axis must be held by the data.
+  if (std::sqrt(c.fit.covariance(0, 0) + c.fit.covariance(1, 1)) > 5.0 * kDegree) return false;
+  // Clearly not a plane: the sagitta over the arc exceeds the residuals.
+  const double half = std::min(0.5 * arc, 0.5 * kPi);
+  const double sagitta = c.fit.surface.radius * (1 - std::cos(half));
+  double sigma = 0;
+  for (std::uint32_t i : c.support) sigma += s.sigma_mm[i];
+  sigma *= c.fit.scale / static_cast<double>(c.support.size());
+  if (arc < 15 * kDegree || sagitta < 6.0 * sigma) return false;
+  // A piece cut out of a free-form surface: goes on smoothly past its rim, or leaves waves inside.
+  const double rim = smooth_rim_share(scene, c.support);
+  const double waves = residual_correlation(scene, c.support, c.fit.surface);
+  if (rim > 0.5 || (rim > 0.3 && waves > 0.5)) return false;
+  return true;
+}
+
+}  // namespace
+
+std::optional<Found> explain_round(Scene& scene, const Indices& component, const Vec3& axis, const Limits& limits) {
+  const Surfels& s = scene.surfels;
+  const Surface rough = cylinder_from_normals(s, component, axis);
+  if (!(rough.radius > 0) || rough.radius > 2 * limits.max_radius_mm) return std::nullopt;
+
+  FitOptions free;
+  free.start_mm = std::min(2.5, 0.15 * rough.radius);  // a step of 3 mm must not be bridged by the kernel
+  std::optional<Candidate> best = settle(scene, component, rough, free, limits);
+  std::size_t best_kept = best ? kept(scene, component, *best) : 0;
+  const double best_radius = best ? best->fit.surface.radius : rough.radius;
+  const double best_sigma = best ? std::sqrt(best->fit.covariance(4, 4)) : 0.2 * rough.radius;
+  const double free_arc = best ? arc_of(s, best->support, best->fit.surface) : 0;
+  if (!best || free_arc < kShortArc)
+    for (double radius : limits.radii_mm) {
+      if (std::abs(radius - best_radius) > std::max(5.0 * best_sigma, 0.2 * best_radius)) continue;
+      Surface start = best ? best->fit.surface : rough;
+      const double side = start.concave ? -1.0 : 1.0;
+      // The surface stays, the axis moves: along the mean normal.
+      Vec3 mean = Vec3::Zero();
+      for (std::uint32_t i : component) mean += s.normal[i].cast<double>();
+      mean -= start.axis * start.axis.dot(mean);
+      start.point += mean.normalized() * side * (start.radius - radius);
+      start.radius = radius;
+      FitOptions held = free;
+      held.hold_radius = true;
+      std::optional<Candidate> c = settle(scene, component, start, held, limits);
+      if (!c) continue;
+      c->from_cad = true;
+      const std::size_t count = kept(scene, component, *c);
+      // A nominal radius replaces the free one unless it loses surfels.
+      if (!best || count > best_kept || (!best->from_cad && count * 100 >= best_kept * 97) ||
+          (best->from_cad && count == best_kept && c->fit.rms_sigma < best->fit.rms_sigma)) {
+        best = std::move(c);
+        best_kept = count;
+      }
+    }
+  if (!best) return std::nullopt;
+
+  // Taper by positions: a cone must not be called a cylinder.
+  FitOptions taper;
+  taper.cone = true;
+  if (!best->from_cad) {
+    Fit cone = fit_round(s, best->support, best->fit.surface, taper);
+    const double sigma = std::sqrt(cone.covariance(5, 5));
+    if (cone.valid && std::abs(cone.surface.half_angle) > std::max(5.0 * sigma, 0.7 * kDegree) &&
+        cone.rms_sigma < 0.8 * best->fit.rms_sigma) {
+      Candidate c;
+      c.fit = cone;
+      c.support = grow(scene, cone.surface, best->support, cone.scale, kRoundSlack);
+      if (c.support.size() >= limits.min_surfels) {
+        c.fit = fit_round(s, c.support, cone.surface, taper);
+        if (c.fit.valid) best = std::move(c);
+      }
+    }
+  }
+  const double arc = arc_of(s, best->support, best->fit.surface);
+  if (!accepted(scene, component, *best, arc, limits)) return std::nullopt;
+  Found out;
+  out.fit = best->fit;
+  out.support = std::move(best->support);
+  out.radius_from_cad = best->from_cad;
+  out.arc = arc;
+  return out;
+}
+
+void find_cones_and_spheres(Scene& scene, const Limits& limits, std::vector<Found>& found) {
+  const Surfels& s = scene.surfels;
+  const std::size_t least = std::max<std::size_t>(6, limits.min_surfels / 2);
+  for (SurfelShape shape : {SurfelShape::ruled, SurfelShape::curved}) {
+    Indices members;
+    for (std::uint32_t i = 0; i < s.size(); ++i)
+      if (scene.free(i) && s.shape[i] == shape) members.push_back(i);
+    for (const Indices& component : components(scene, members, least)) {
+      const bool sphere = shape == SurfelShape::curved;
+      const Surface start = sphere ? sphere_from_normals(s, component) : cone_from_normals(s, component);
+      if (!(start.radius > 0) || start.radius > limits.max_radius_mm) continue;
+      if (!sphere && (std::abs(start.half_angle) < 3 * kDegree || std::abs(start.half_angle) > 80 * kDegree)) continue;
+      FitOptions options;
+      options.start_mm = std::min(2.5, 0.15 * start.radius);
+      options.cone = !sphere;
+      std::optional<Candidate> c = settle(scene, component, start, options, limits);
+      if (!c) continue;
+      const double arc = arc_of(s, c->support, c->fit.surface);
+      if (!sphere && !accepted(scene, component, *c, arc, limits)) continue;
+      if (sphere && (area_of(s, c->support) < limits.min_area_mm2 || c->fit.rms_sigma > kMaxRmsSigma ||
+                     2 * kept(scene, component, *c) < component.size() || smooth_rim_share(scene, c->support) > 0.3 ||
+                     std::sqrt(c->fit.covariance(4, 4)) > 0.1 * c->fit.surface.radius))
+        continue;
+      Found out;
+      out.fit = c->fit;
+      out.support = std::move(c->support);
+      out.arc = arc;
+      take(scene, found, std::move(out));
+    }
+  }
+}
+
+}  // namespace tribin::segmentation_detail
