@@ -145,14 +145,11 @@ TEST(ReadStep, ReadsPartsOfManyWriters) {
     SCOPED_TRACE(name);
     const Mesh mesh = read_step(path, {.chord_error_mm = 0.1});
     expect_sound(mesh, 0.002);
-    std::map<SurfaceType, int> types;
-    for (const CadFace& f : mesh.faces) ++types[f.type];
-    std::printf(
-        "%-28s %6zu triangles, open edges %4d, oriented %d, box %7.1f %7.1f %7.1f mm, faces: plane %d cylinder %d cone "
-        "%d sphere %d torus %d free %d\n",
-        name.c_str(), mesh.triangles.size(), open_edges(mesh), mesh.oriented, (high - low).x(), (high - low).y(),
-        (high - low).z(), types[SurfaceType::plane], types[SurfaceType::cylinder], types[SurfaceType::cone],
-        types[SurfaceType::sphere], types[SurfaceType::torus], types[SurfaceType::free_form]);
+    EXPECT_TRUE(mesh.oriented);
+    EXPECT_GT(volume(mesh), 0);
+    int named = 0;
+    for (const CadFace& f : mesh.faces) named += f.type != SurfaceType::free_form;
+    EXPECT_GE(2 * named, static_cast<int>(mesh.faces.size())) << "most faces of machine parts have an exact surface";
   }
 }
 
