@@ -179,22 +179,21 @@ void SurfaceIndex::build_nodes() {
 /// Calls visit(triangle index) -> squared radius to go on with (negative: stop), nearer boxes first.
 template <class Visit>
 void SurfaceIndex::visit_within(const Vec3& p, double radius_mm, Visit&& visit) const {
-  const auto squared_distance = [&p](const Node& node) {
-    double sum = 0;
-    for (int k = 0; k < 3; ++k) {
-      const double d = std::max({node.low[k] - p[k], p[k] - node.high[k], 0.0});
-      sum += d * d;
-    }
-    return sum;
+  const float x = static_cast<float>(p.x()), y = static_cast<float>(p.y()), z = static_cast<float>(p.z());
+  const auto squared_distance = [x, y, z](const Node& node) {
+    const float dx = std::max(std::max(node.low[0] - x, x - node.high[0]), 0.0f);
+    const float dy = std::max(std::max(node.low[1] - y, y - node.high[1]), 0.0f);
+    const float dz = std::max(std::max(node.low[2] - z, z - node.high[2]), 0.0f);
+    return dx * dx + dy * dy + dz * dz;
   };
   double limit = radius_mm * radius_mm;
   struct Entry {
     std::int32_t node;
-    double squared;
+    float squared;
   };
   std::array<Entry, 64> stack;  // the tree is balanced: its depth is log2 of the number of triangles
   int top = 0;
-  if (const double d = squared_distance(nodes_[0]); d <= limit) stack[top++] = {0, d};
+  if (const float d = squared_distance(nodes_[0]); d <= limit) stack[top++] = {0, d};
   while (top > 0) {
     const Entry entry = stack[--top];
     if (entry.squared > limit) continue;
@@ -220,6 +219,8 @@ bool SurfaceIndex::has_near(const Vec3& p, const Vec3& n, double radius_mm, doub
     const Triangle& t = triangles_[i];
     const double cosine = t.normal.dot(n);
     if ((oriented_ ? cosine : std::abs(cosine)) < min_cos) return limit;
+    const double off_plane = t.normal.dot(p - t.a);
+    if (off_plane * off_plane > limit) return limit;
     if ((p - nearest_on_triangle(t.a, t.ab, t.ac, p)).squaredNorm() > limit) return limit;
     found = true;
     return -1.0;
@@ -233,6 +234,8 @@ SurfaceHit SurfaceIndex::nearest(const Vec3& p, const Vec3& n, double radius_mm,
     const Triangle& t = triangles_[i];
     const double cosine = t.normal.dot(n);
     if ((oriented_ ? cosine : std::abs(cosine)) < min_cos) return limit;
+    const double off_plane = t.normal.dot(p - t.a);
+    if (off_plane * off_plane > limit) return limit;
     const Vec3 q = nearest_on_triangle(t.a, t.ab, t.ac, p);
     const double squared = (p - q).squaredNorm();
     if (squared > limit || (hit.triangle >= 0 && squared == limit)) return limit;

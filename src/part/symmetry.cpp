@@ -17,6 +17,7 @@ constexpr double kTelling = 0.005;
 constexpr double kScanReach = 0.02;    // half a step of the scan moves the rim by 1.7 %
 constexpr double kPolishReach = 0.03;  // the offset of near symmetries from the centroid, and half a step
 constexpr double kSameMotion = 0.03;   // rms: poses that refinement would take to one another
+constexpr double kRidgeSpacing = 0.2;  // rms: enough that a search along the ridge from each meets the next
 constexpr double kProminence = 0.01;   // of the overlap; 1/2000 of the surface is the sampling's own step
 constexpr double kSymmetryOverlap = 0.97;
 constexpr double kMostOff = 0.001;  // of the surface, further off than the telling length
@@ -83,10 +84,10 @@ class Search {
     return overlap_of(surface_, first(kJudgeSamples), motion, fine_, floor);
   }
 
-  bool is_symmetry(const Pose& motion) const {
+  bool is_symmetry(const Pose& motion, int samples = kStrictSamples) const {
     if (overlap_of(surface_, first(kPolishSamples), motion, fine_, 0.95) < 0.95) return false;
-    if (overlap_of(surface_, samples_, motion, telling_, 1 - kMostOff) < 1 - kMostOff) return false;
-    return overlap_of(surface_, samples_, motion, fine_, kSymmetryOverlap) >= kSymmetryOverlap;
+    if (overlap_of(surface_, first(samples), motion, telling_, 1 - kMostOff) < 1 - kMostOff) return false;
+    return overlap_of(surface_, first(samples), motion, fine_, kSymmetryOverlap) >= kSymmetryOverlap;
   }
 
   /// The rotation of a motion, about the point that every symmetry fixes.
@@ -237,51 +238,57 @@ class Search {
       if (group.continuous.size() == 1 && is_symmetry(swap_ends_)) group.discrete.push_back(swap_ends_);
       return;
     }
-    std::vector<Matrix3> rotations;
+    std::vector<Matrix3> members = {Matrix3::Identity()};
     for (const Judged& j : judged_) {
       if (j.overlap < kSymmetryOverlap - 0.01) break;
-      if (is_symmetry(about_centroid(j.motion.linear()))) rotations.push_back(j.motion.linear());
-    }
-    // A motion of which the products are no symmetries is none itself, however well it fits; the worst go first.
-    std::vector<Matrix3> members;
-    while (true) {
-      members = close_group(rotations, kSameRotation, kLargestGroup);
-      const bool all = !members.empty() && std::all_of(members.begin(), members.end(), [&](const Matrix3& m) {
-        return is_symmetry(about_centroid(m));
-      });
-      if (all || rotations.empty()) break;
-      rotations.pop_back();
+      const Matrix3 rotation = j.motion.linear();
+      if (index_of(members, rotation, kSameRotation) >= 0 || !is_symmetry(about_centroid(rotation))) continue;
+      // One of which the products are no symmetries is none itself, however well it fits.
+      std::vector<Matrix3> larger = members;
+      larger.push_back(rotation);
+      larger = close_group(larger, kSameRotation, kLargestGroup);
+      if (larger.empty()) continue;
+      larger = sharpen_group(larger, kSameRotation);
+      const int samples = std::max(kJudgeSamples, kStrictSamples / static_cast<int>(larger.size()));
+      const bool all = std::all_of(larger.begin() + 1, larger.end(),
+                                   [&](const Matrix3& m) { return is_symmetry(about_centroid(m), samples); });
+      if (all) members = larger;
     }
     for (std::size_t i = 1; i < members.size(); ++i) group.discrete.push_back(about_centroid(members[i]));
   }
 
   void collect_self_similar() {
-    const double apart = kSameMotion * surface_.diameter_mm();
-    const auto is_new = [&](const Pose& motion) {
-      const auto near = [&](const Pose& other) {
-        return rms_modulo(motion, other, result_.group, surface_.centroid(), surface_.covariance()) < apart;
-      };
-      if (near(Pose::Identity())) return false;
-      return std::none_of(result_.self_similar.begin(), result_.self_similar.end(),
-                          [&](const SelfSimilarPose& s) { return near(s.part_from_part); });
-    };
+    const double d = surface_.diameter_mm();
     const std::size_t most = static_cast<std::size_t>(options_.max_self_similar);
+    std::vector<Pose> kept = {Pose::Identity()};
     for (const Judged& j : judged_)
       for (const Pose& motion : {j.motion, Pose(j.motion.inverse())}) {
-        if (result_.self_similar.size() >= most || !is_new(motion) || !is_peak(j)) continue;
+        if (result_.self_similar.size() >= most) return;
+        double nearest = d;
+        for (const Pose& other : kept)
+          nearest =
+              std::min(nearest, rms_modulo(motion, other, result_.group, surface_.centroid(), surface_.covariance()));
+        if (nearest < kSameMotion * d || (nearest < kRidgeSpacing * d && on_ridge(motion, kept))) continue;
+        kept.push_back(motion);
         result_.self_similar.push_back({motion, j.overlap, discriminating_points(motion)});
       }
   }
 
-  /// A turned part with a few features has most of itself in place after any turn; only the turns that stand out of
-  /// that count.
-  bool is_peak(const Judged& j) const {
-    const Axis axis = axis_of(j.motion);
-    const double across = surface_.covariance().trace() - axis.direction.dot(surface_.covariance() * axis.direction);
-    const double angle = kSameMotion * surface_.diameter_mm() / std::sqrt(std::max(across, 1e-12));
-    for (const double sign : {1.0, -1.0})
-      if (judge(turn(axis, sign * angle) * j.motion, j.overlap - kProminence) > j.overlap - kProminence) return false;
-    return true;
+  /// A turned part with a few features keeps most of itself in place after any turn: from each such pose there is a way
+  /// to a better one on which the overlap does not drop.
+  bool on_ridge(const Pose& motion, const std::vector<Pose>& better) const {
+    const auto samples = first(kJudgeSamples / 2);
+    const double limit = overlap_of(surface_, samples, motion, fine_) - kProminence;
+    for (const Pose& other : better)
+      for (const Pose& g : result_.group.discrete) {
+        const Pose way = other * g * motion.inverse();
+        const Vec3 w = vector_from_rotation(way.linear());
+        if (w.norm() < 1 * kDegree) continue;
+        const double share = std::min(1.0, kSameMotion * surface_.diameter_mm() / rms(other * g, motion));
+        const Pose step = turn(axis_of(way), share * w.norm()) * motion;
+        if (overlap_of(surface_, samples, step, fine_, limit) >= limit) return true;
+      }
+    return false;
   }
 
   std::vector<Vec3f> discriminating_points(const Pose& motion) const {

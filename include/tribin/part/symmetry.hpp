@@ -27,13 +27,15 @@ struct SymmetryResult {
 ///
 /// A motion T (part_from_part) is a *symmetry* when at most 0.1 % of the surface is moved further than `telling_mm`
 /// from the surface and at least 97 % stays within `tolerance_mm` of it, normals agreeing. A faceted cylinder counts as
-/// round: facets that meet under 0.5 rad or less are taken for a tessellation. All other motions that are a local best
-/// and keep `min_overlap` in place are *self-similar poses*: `overlap` is the share of the surface that stays within
-/// `tolerance_mm`; `discriminating_points` are the places x on the surface where the moved part has none:
-/// T^-1 x is further than `telling_mm` from it. (What the moved part has and the part does not is the list of T^-1,
-/// which is a pose of the list too, where the cap allows.) 0.5 % of the diameter is about five times the depth noise of
-/// the scans that tribin is made for (0.1 mm on a part of 100 mm): a place that differs by less tells nothing in one
-/// pixel.
+/// round: facets that meet under 0.5 rad or less are taken for a tessellation.
+///
+/// All other motions that are a local best and keep `min_overlap` in place are *self-similar poses*. A part that is all
+/// but round keeps most of itself in place after any turn; such a ridge is listed by a few turns, about 40 deg apart.
+/// `overlap` is the share of the surface that stays within `tolerance_mm`; `discriminating_points` are places x on the
+/// surface where the moved part has none: T^-1 x is further than `telling_mm` from it (at most 400, evenly spread).
+/// What the moved part has and the part has not is the list of T^-1, which follows T where the two differ and the cap
+/// allows. 0.5 % of the diameter is about five times the depth noise of the scans that tribin is made for (0.1 mm on a
+/// part of 100 mm): a place that differs by less tells nothing in one pixel.
 ///
 /// `group.continuous` holds the axis of a part of revolution; `group.discrete` then holds the identity and, where the
 /// part has one, a half turn that swaps the ends. A ball is three continuous axes. Mirror images are not looked for.
