@@ -19,9 +19,16 @@ Registry& registry() {
   return instance;
 }
 
-using Parser = Mesh (*)(const io::FileBytes&);
+/// Mesh formats by extension; `unit_known` is set by a format that names its unit (it comes in mm then).
+using Parser = Mesh (*)(const io::FileBytes&, bool& unit_known);
+
 const std::map<std::string, Parser>& parsers() {
-  static const std::map<std::string, Parser> table = {{".stl", io::parse_stl}, {".ply", io::parse_ply_mesh}};
+  static const std::map<std::string, Parser> table = {
+      {".stl", [](const io::FileBytes& file, bool&) { return io::parse_stl(file); }},
+      {".ply", [](const io::FileBytes& file, bool&) { return io::parse_ply_mesh(file); }},
+      {".obj", [](const io::FileBytes& file, bool&) { return io::parse_obj(file); }},
+      {".dxf", io::parse_dxf},
+  };
   return table;
 }
 
@@ -62,10 +69,14 @@ Mesh read_cad(const std::filesystem::path& path, const CadReadOptions& options) 
     for (const std::string& e : cad_extensions()) known += (known.empty() ? "" : " ") + e;
     io::bad_file(path.string(), "", "extension " + io::in_quotes(extension), "a CAD file (" + known + ")");
   }
-  Mesh mesh = parser->second(io::read_file(path));
+  bool unit_known = false;
+  Mesh mesh = parser->second(io::read_file(path), unit_known);
   const LengthUnit unit = options.unit == LengthUnit::automatic ? LengthUnit::millimetre : options.unit;
   const auto scale = static_cast<float>(millimetres_in(unit));
-  if (scale != 1) {
+  if (unit_known && options.unit != LengthUnit::automatic && scale != 1) {
+    mesh.warnings.push_back("the file names its own unit; the unit " + std::string(name_of(unit)) + " is not used");
+  }
+  if (!unit_known && scale != 1) {
     for (Vec3f& p : mesh.vertices) p *= scale;
   }
   mesh.name = path.stem().string();

@@ -15,4 +15,11 @@ Mesh parse_stl(const FileBytes& file);
 /// The polygons of a PLY file, cut into triangles.
 Mesh parse_ply_mesh(const FileBytes& file);
 
+/// OBJ: polygons with positive or negative numbers; texture and normals are not needed.
+Mesh parse_obj(const FileBytes& file);
+
+/// DXF: what dxf_content.hpp lists, each INSERT in its place, in mm where $INSUNITS says what the file's unit is.
+/// `unit_known` tells whether it did.
+Mesh parse_dxf(const FileBytes& file, bool& unit_known);
+
 }  // namespace tribin::io

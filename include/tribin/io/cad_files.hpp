@@ -11,8 +11,8 @@
 namespace tribin {
 
 struct CadReadOptions {
-  /// Unit of files that name none (STL, OBJ, PLY, DXF without $INSUNITS). `automatic` = millimetre.
-  LengthUnit unit = LengthUnit::millimetre;
+  /// Unit of files that name none (STL, OBJ, PLY, DXF without $INSUNITS). `automatic` = millimetre. A file's own unit wins.
+  LengthUnit unit = LengthUnit::automatic;
 };
 
 /// Reads a CAD file as a mesh [mm]: STL, PLY, OBJ, DXF, and what is registered (STEP, IGES). Vertices are welded,
