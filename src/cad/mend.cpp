@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "cad/winding.hpp"
 #include "tribin/core/error.hpp"
 
 namespace tribin {
@@ -61,6 +62,19 @@ bool flat(const Mesh& mesh, const std::array<std::uint32_t, 3>& t, double tolera
   return (b - a).cross(c - a).norm() <= tolerance * longest;  // height over the longest side
 }
 
+void add_warnings(Mesh& mesh, const MendReport& report, std::size_t triangles) {
+  const auto say = [&](std::size_t count, const std::string& text) {
+    if (count) mesh.warnings.push_back(std::to_string(count) + text);
+  };
+  say(report.degenerate, " triangles without area were dropped");
+  say(report.duplicate, " duplicate triangles were dropped");
+  say(report.flipped, " of " + std::to_string(triangles) + " triangles were wound inward or mixed and were turned");
+  say(report.boundary_edges, " edges belong to one triangle only: the surface is open there");
+  say(report.junction_edges, " edges belong to more than two triangles");
+  say(report.unoriented_shells, " of " + std::to_string(report.shells) + " shells: the outside cannot be told" +
+                                    (mesh.oriented ? "" : "; the mesh is used two-sided"));
+}
+
 }  // namespace
 
 MendReport mend_mesh(Mesh& mesh) {
@@ -78,6 +92,7 @@ MendReport mend_mesh(Mesh& mesh) {
     return t[0] != t[1] && t[1] != t[2] && t[2] != t[0];
   });
   report.duplicate = drop_duplicates(mesh);
+  if (!mesh.triangles.empty()) mend_winding(mesh, report);
   // Slivers hold the shell together over T-junctions, so that they go only after the winding is known.
   report.degenerate += filter_triangles(mesh, [&](std::size_t i) { return !flat(mesh, mesh.triangles[i], tolerance); });
   if (mesh.triangles.empty()) {
@@ -86,9 +101,7 @@ MendReport mend_mesh(Mesh& mesh) {
                                                 "wanted the surface of a part");
   }
   weld_vertices(mesh, 0);  // drops the vertices that no triangle uses
-  if (report.degenerate)
-    mesh.warnings.push_back(std::to_string(report.degenerate) + " triangles without area were dropped");
-  if (report.duplicate) mesh.warnings.push_back(std::to_string(report.duplicate) + " duplicate triangles were dropped");
+  add_warnings(mesh, report, before);
   return report;
 }
 

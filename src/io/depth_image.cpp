@@ -48,7 +48,9 @@ CameraFile camera_of_image(const std::filesystem::path& image, const ScanReadOpt
   const int id = options.image_id >= 0 ? options.image_id : number_of_name(image);
   if (!options.camera_file.empty()) return read_camera_file(options.camera_file, id);
   const auto folder = image.parent_path();
-  for (const auto& candidate : {folder / "camera.json", folder / ".." / "scene_camera.json"}) {
+  auto own = image;  // STEM.camera.json, as write_scan leaves it
+  own.replace_extension(".camera.json");
+  for (const auto& candidate : {own, folder / "camera.json", folder / ".." / "scene_camera.json"}) {
     if (std::filesystem::is_regular_file(candidate)) return read_camera_file(candidate, id);
   }
   bad_file(image.string(), "", "a depth image without camera file",

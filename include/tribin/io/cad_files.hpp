@@ -11,7 +11,8 @@
 namespace tribin {
 
 struct CadReadOptions {
-  /// Unit of files that name none (STL, OBJ, PLY, DXF without $INSUNITS). `automatic` = millimetre. A file's own unit wins.
+  /// Unit of files that name none (STL, OBJ, PLY, DXF without $INSUNITS). `automatic` = millimetre. A file's own unit
+  /// wins.
   LengthUnit unit = LengthUnit::automatic;
 };
 
