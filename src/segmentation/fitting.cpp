@@ -87,9 +87,13 @@ Sampled sample(const Surfels& surfels, std::span<const std::uint32_t> support, i
   const std::size_t stride = 1 + support.size() / static_cast<std::size_t>(std::max(1, max_surfels));
   out.points.reserve(support.size() / stride + 1);
   out.inverse_sigma.reserve(support.size() / stride + 1);
+  Vec3 raw[3];
   for (std::size_t i = 0; i < support.size(); i += stride) {
-    out.points.push_back(surfels.position[support[i]].cast<double>());
-    out.inverse_sigma.push_back(1.0 / surfels.sigma_mm[support[i]]);
+    const int count = raw_points(surfels, support[i], raw);
+    for (int k = 0; k < count; ++k) {
+      out.points.push_back(raw[k]);
+      out.inverse_sigma.push_back(1.0 / surfels.sigma_mm[support[i]]);
+    }
   }
   return out;
 }
@@ -129,12 +133,32 @@ double correlation_inflation(const Surfels& s) {
 
 }  // namespace
 
+int raw_points(const Surfels& surfels, std::uint32_t i, Vec3 points[3]) {
+  if (surfels.mesh == nullptr) {
+    points[0] = surfels.position[i].cast<double>();
+    return 1;
+  }
+  for (int k = 0; k < 3; ++k) points[k] = surfels.mesh->vertices[surfels.mesh->triangles[i][k]].cast<double>();
+  return 3;
+}
+
+double misfit(const Surfels& surfels, std::uint32_t i, const Surface& surface) {
+  Vec3 raw[3];
+  const int count = raw_points(surfels, i, raw);
+  double worst = 0;
+  for (int k = 0; k < count; ++k) {
+    const double d = surface.distance(raw[k]);
+    if (std::abs(d) >= std::abs(worst)) worst = d;
+  }
+  return worst;
+}
+
 double residual_scale(const Surfels& surfels, std::span<const std::uint32_t> support, const Surface& surface) {
   std::vector<double> residuals;
   double points = 0;
   residuals.reserve(support.size());
   for (std::uint32_t i : support) {
-    residuals.push_back(std::abs(surface.distance(surfels.position[i].cast<double>())) / surfels.sigma_mm[i]);
+    residuals.push_back(std::abs(misfit(surfels, i, surface)) / surfels.sigma_mm[i]);
     points += surfels.points[i];
   }
   if (residuals.empty()) return 1;
@@ -144,7 +168,7 @@ double residual_scale(const Surfels& surfels, std::span<const std::uint32_t> sup
 
 Fit fit_plane(const Surfels& surfels, std::span<const std::uint32_t> support) {
   Fit fit;
-  if (support.size() < 3) return fit;
+  if (support.size() < 3 && surfels.mesh == nullptr) return fit;
   Surface plane;
   double scale = 1;
   Matrix3 covariance = Matrix3::Zero();
@@ -154,15 +178,19 @@ Fit fit_plane(const Surfels& surfels, std::span<const std::uint32_t> support) {
     Matrix3 second = Matrix3::Zero();
     total = 0;
     const Vec3 origin = round == 0 ? Vec3(surfels.position[support[0]].cast<double>()) : plane.point;
+    Vec3 raw[3];
     for (std::uint32_t i : support) {
-      const Vec3 p = surfels.position[i].cast<double>() - origin;
+      const int count = raw_points(surfels, i, raw);
       const double inverse = 1.0 / surfels.sigma_mm[i];
-      double weight = inverse * inverse;
-      if (round > 0) weight *= robust_weight(plane.distance(p + origin) * inverse, 3.0 * scale);
-      total += weight;
-      mean += weight * p;
-      second += weight * p * p.transpose();
-      facing += weight * surfels.normal[i].cast<double>();
+      for (int k = 0; k < count; ++k) {
+        const Vec3 p = raw[k] - origin;
+        double weight = inverse * inverse;
+        if (round > 0) weight *= robust_weight(plane.distance(raw[k]) * inverse, 3.0 * scale);
+        total += weight;
+        mean += weight * p;
+        second += weight * p * p.transpose();
+        facing += weight * surfels.normal[i].cast<double>();
+      }
     }
     if (!(total > 0)) return fit;
     mean /= total;
@@ -178,7 +206,7 @@ Fit fit_plane(const Surfels& surfels, std::span<const std::uint32_t> support) {
   double squares = 0;
   int inliers = 0;
   for (std::uint32_t i : support) {
-    const double e = plane.distance(surfels.position[i].cast<double>()) / surfels.sigma_mm[i];
+    const double e = misfit(surfels, i, plane) / surfels.sigma_mm[i];
     if (std::abs(e) > 4.0 * scale) continue;
     squares += e * e;
     ++inliers;
@@ -200,8 +228,8 @@ Fit fit_plane(const Surfels& surfels, std::span<const std::uint32_t> support) {
 Fit fit_round(const Surfels& surfels, std::span<const std::uint32_t> support, const Surface& start,
               const FitOptions& options) {
   Fit fit;
-  if (support.size() < kParameters) return fit;
   const Sampled data = sample(surfels, support, options.max_surfels);
+  if (data.points.size() < kParameters) return fit;
   Surface s = start;
   if (options.cone) s.type = PrimitiveType::cone;
 
@@ -288,7 +316,7 @@ Fit fit_round(const Surfels& surfels, std::span<const std::uint32_t> support, co
   const Eigen::LDLT<Square> solver(h);
   if (solver.info() != Eigen::Success || solver.vectorD().minCoeff() <= 0) return fit;
   Square covariance = solver.solve(Square::Identity());
-  const double share = static_cast<double>(data.points.size()) / static_cast<double>(support.size());
+  const double share = std::min(1.0, static_cast<double>(data.points.size()) / static_cast<double>(support.size()));
   covariance *= correlation_inflation(surfels) * std::max(1.0, fit.rms_sigma * fit.rms_sigma) * share;
   const auto clear = [&](int i) {
     covariance.row(i).setZero();

@@ -25,6 +25,13 @@ struct Surface {
   Vec3 normal(const Vec3& p) const;
 };
 
+/// The raw points behind a surfel that fits run on: the corrected mean of a scan's cell; the three vertices of a
+/// triangle, which lie on the true surface where the facet does not. \return how many were written.
+int raw_points(const Surfels& surfels, std::uint32_t i, Vec3 points[3]);
+
+/// Signed distance of a surfel from a surface [mm]: of its raw point that is farthest off.
+double misfit(const Surfels& surfels, std::uint32_t i, const Surface& surface);
+
 /// Result of a fit.
 struct Fit {
   Surface surface;

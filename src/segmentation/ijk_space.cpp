@@ -13,12 +13,14 @@ constexpr double kPeakWidth = 5.0 * kDegree;   // of the kernel: about two bins
 struct Binned {
   std::vector<std::uint32_t> begin;
   std::vector<std::uint32_t> members;
+  std::vector<std::int32_t> bin_of;  ///< per surfel, -1 = votes not
 };
 
 Binned bin_flat(const Scene& scene, const DirectionBins& bins, std::vector<float>& votes) {
   const Surfels& s = scene.surfels;
   Binned out;
-  std::vector<std::int32_t> bin_of(s.size(), -1);
+  std::vector<std::int32_t>& bin_of = out.bin_of;
+  bin_of.assign(s.size(), -1);
   out.begin.assign(bins.center.size() + 1, 0);
   votes.assign(bins.center.size(), 0.0f);
   for (std::uint32_t i = 0; i < s.size(); ++i) {
@@ -35,7 +37,15 @@ Binned bin_flat(const Scene& scene, const DirectionBins& bins, std::vector<float
   return out;
 }
 
-std::optional<Found> explain_plane(Scene& scene, const Indices& component, const Limits& limits) {
+/// A mesh is exact: the component's largest triangle gives the plane, and nothing may pull at it.
+Indices seed_of(const Surfels& s, const Indices& component) {
+  if (s.mesh == nullptr) return component;
+  return {*std::max_element(component.begin(), component.end(),
+                            [&](std::uint32_t a, std::uint32_t b) { return s.area_mm2[a] < s.area_mm2[b]; })};
+}
+
+std::optional<Found> explain_plane(Scene& scene, const Indices& whole, const Limits& limits) {
+  const Indices component = seed_of(scene.surfels, whole);
   Fit fit = fit_plane(scene.surfels, component);
   if (!fit.valid) return std::nullopt;
   Found out;
@@ -46,7 +56,8 @@ std::optional<Found> explain_plane(Scene& scene, const Indices& component, const
     if (!fit.valid) return std::nullopt;
   }
   // The support must hold the plane's direction: strips one cell wide do not.
-  if (std::sqrt(fit.covariance.topLeftCorner<2, 2>().trace()) > 3.0 * kDegree) return std::nullopt;
+  if (scene.surfels.mesh == nullptr && std::sqrt(fit.covariance.topLeftCorner<2, 2>().trace()) > 3.0 * kDegree)
+    return std::nullopt;
   if (area_of(scene.surfels, out.support) < limits.min_area_mm2) return std::nullopt;
   out.fit = fit;
   return out;
@@ -73,6 +84,8 @@ void find_planes(Scene& scene, const Limits& limits, HoughSpaces& spaces, std::v
   };
   for (std::size_t b = 0; b < votes.size(); ++b) smooth_at(b);
 
+  const std::size_t least = s.mesh != nullptr ? 1 : std::max<std::size_t>(3, limits.min_surfels / 3);
+  std::vector<std::uint8_t> dead(s.size(), 0);
   Indices members;
   for (;;) {
     const auto best = static_cast<int>(std::max_element(smooth.begin(), smooth.end()) - smooth.begin());
@@ -89,7 +102,7 @@ void find_planes(Scene& scene, const Limits& limits, HoughSpaces& spaces, std::v
           const std::uint32_t i = binned.members[k];
           const Vec3 n = s.normal[i].cast<double>();
           const double dot = n.dot(direction);
-          if (!scene.free(i) || std::abs(dot) < std::cos(kPeakWidth)) continue;
+          if (!scene.free(i) || dead[i] || std::abs(dot) < std::cos(kPeakWidth)) continue;
           members.push_back(i);
           sum += n * (dot > 0 ? s.area_mm2[i] : -s.area_mm2[i]);
           gathered += s.area_mm2[i];
@@ -103,37 +116,56 @@ void find_planes(Scene& scene, const Limits& limits, HoughSpaces& spaces, std::v
     peak.votes = gathered;
     const int peak_index = static_cast<int>(spaces.peaks.size());
 
+    const std::size_t found_before = found.size();
     bool any = false;
     for (int side = 0; side < 2; ++side) {
       Indices one_side;
       for (std::uint32_t i : members)
         if ((s.normal[i].cast<double>().dot(direction) > 0) == (side == 0)) one_side.push_back(i);
       std::sort(one_side.begin(), one_side.end());
-      for (const Indices& component : components(scene, one_side, std::max<std::size_t>(3, limits.min_surfels / 3))) {
-        Indices still_free;
-        for (std::uint32_t i : component)
-          if (scene.free(i)) still_free.push_back(i);
-        if (still_free.size() < std::max<std::size_t>(3, limits.min_surfels / 3)) continue;
-        std::optional<Found> plane = explain_plane(scene, still_free, limits);
-        if (!plane) continue;
-        plane->peak = peak_index;
-        any = true;
-        take(scene, found, std::move(*plane));
+      for (const Indices& component : components(scene, one_side, least)) {
+        Indices left = component;
+        for (;;) {  // a component may hold several planes a few degrees apart
+          std::erase_if(left, [&](std::uint32_t i) { return !scene.free(i); });
+          if (left.size() < least) break;
+          std::optional<Found> plane = explain_plane(scene, left, limits);
+          if (!plane) break;
+          plane->peak = peak_index;
+          any = true;
+          take(scene, found, std::move(*plane));
+        }
       }
     }
     if (any) spaces.peaks.push_back(peak);
-    // What was looked at votes no more, explained or not.
-    for (std::uint32_t i : members) votes[bins.find(s.normal[i])] = 0;
-    votes[best] = 0;
-    for (std::size_t b = 0; b < votes.size(); ++b) {
-      if (votes[b] > 0) {
-        float left = 0;
-        for (std::uint32_t k = binned.begin[b]; k < binned.begin[b + 1]; ++k)
-          if (scene.free(binned.members[k])) left += s.area_mm2[binned.members[k]];
-        votes[b] = left;
+    // What was looked at votes no more, explained or not; nor does what became explained.
+    // The whole of the bins that made the peak, so that each peak ends some votes.
+    const bool nothing_near = members.empty();  // all lie just outside of the kernel: they are done with too
+    for (std::uint32_t b : bins.neighbours(best))
+      for (std::uint32_t k = binned.begin[b]; k < binned.begin[b + 1]; ++k)
+        if (nothing_near || b == static_cast<std::uint32_t>(best)) members.push_back(binned.members[k]);
+    std::vector<std::uint32_t> changed;
+    for (std::uint32_t i : members) {
+      dead[i] = 1;
+      changed.push_back(static_cast<std::uint32_t>(binned.bin_of[i]));
+    }
+    for (std::size_t f = found_before; f < found.size(); ++f)
+      for (std::uint32_t i : found[f].support)
+        if (binned.bin_of[i] >= 0) changed.push_back(static_cast<std::uint32_t>(binned.bin_of[i]));
+    std::sort(changed.begin(), changed.end());
+    changed.erase(std::unique(changed.begin(), changed.end()), changed.end());
+    for (std::uint32_t b : changed) {
+      votes[b] = 0;
+      for (std::uint32_t k = binned.begin[b]; k < binned.begin[b + 1]; ++k) {
+        const std::uint32_t i = binned.members[k];
+        if (scene.free(i) && !dead[i]) votes[b] += s.area_mm2[i];
       }
     }
-    for (std::size_t b = 0; b < votes.size(); ++b) smooth_at(b);
+    std::vector<std::uint32_t> around;
+    for (std::uint32_t b : changed)
+      for (std::uint32_t k : bins.neighbours(static_cast<int>(b))) around.push_back(k);
+    std::sort(around.begin(), around.end());
+    around.erase(std::unique(around.begin(), around.end()), around.end());
+    for (std::uint32_t b : around) smooth_at(b);
   }
 }
 

@@ -62,7 +62,7 @@ void find_cylinders(Scene& scene, const Limits& limits, HoughSpaces& spaces, std
     const std::vector<float> votes = vote_rulings(scene, dead);
     const auto best = static_cast<std::size_t>(std::max_element(votes.begin(), votes.end()) - votes.begin());
     // The kernels spread a cylinder's votes over some twenty bins.
-    if (votes[best] < 0.02 * limits.min_area_mm2) break;
+    if (votes[best] <= 0 || votes[best] < 0.02 * limits.min_area_mm2) break;
     Vec3 axis = bins.center[best].cast<double>();
     Indices members;
     double gathered = 0;

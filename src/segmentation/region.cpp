@@ -68,7 +68,7 @@ std::vector<Indices> components(Scene& scene, std::span<const std::uint32_t> mem
 
 bool fits(const Surfels& s, std::uint32_t i, const Surface& surface, double scale, double slack) {
   const Vec3 p = s.position[i].cast<double>();
-  if (std::abs(surface.distance(p)) > 4.0 * scale * s.sigma_mm[i]) return false;
+  if (std::abs(misfit(s, i, surface)) > 4.0 * scale * s.sigma_mm[i]) return false;
   const double limit = std::min(4.0 * scale * s.sigma_normal[i] + slack, 60.0 * kDegree);
   return surface.normal(p).dot(s.normal[i].cast<double>()) > std::cos(limit);
 }
@@ -91,7 +91,7 @@ double residual_correlation(Scene& scene, std::span<const std::uint32_t> support
   const Surfels& s = scene.surfels;
   const std::uint32_t inside = ++scene.tick;
   for (std::uint32_t i : support) scene.mark[i] = inside;
-  const auto residual = [&](std::uint32_t i) { return surface.distance(s.position[i].cast<double>()) / s.sigma_mm[i]; };
+  const auto residual = [&](std::uint32_t i) { return misfit(s, i, surface) / s.sigma_mm[i]; };
   double products = 0, squares = 0;
   for (std::uint32_t i : support) {
     const double r = residual(i);

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "segmentation/cad_faces.hpp"
 #include "segmentation/spaces.hpp"
 #include "tribin/core/error.hpp"
 #include "tribin/segmentation/primitives.hpp"
@@ -21,7 +22,11 @@ Limits limits_of(const Surfels& surfels, const Scene& scene, const SegmentationO
   std::sort(limits.radii_mm.begin(), limits.radii_mm.end());
   const bool cad = surfels.mesh != nullptr;
   const double cell = scene.cell_mm * scene.cell_mm;
-  limits.min_area_mm2 = options.min_area_mm2 > 0 ? options.min_area_mm2 : cad ? 0.0 : kCells * cell;
+  double total = 0;
+  for (float area : surfels.area_mm2) total += area;
+  // On CAD, facets of fillets and of lettering are no primitives; a screw hole in a housing has 5e-4 of its area.
+  const double least = cad ? 2e-4 * total : kCells * cell;
+  limits.min_area_mm2 = options.min_area_mm2 > 0 ? options.min_area_mm2 : least;
   limits.min_surfels = cad ? 1 : std::max<std::size_t>(8, static_cast<std::size_t>(0.5 * limits.min_area_mm2 / cell));
   // Surfels call "ruled" what bends by more than half of 1 / max_radius of their options: twice the default of 100 mm.
   limits.max_radius_mm = 250;
@@ -44,7 +49,7 @@ void fill_ijk(const Surfels& s, HoughSpaces& spaces) {
 
 double rms_mm(const Surfels& s, const Indices& support, const Surface& surface) {
   double squares = 0;
-  for (std::uint32_t i : support) squares += std::pow(surface.distance(s.position[i].cast<double>()), 2);
+  for (std::uint32_t i : support) squares += std::pow(misfit(s, i, surface), 2);
   return std::sqrt(squares / static_cast<double>(support.size()));
 }
 
@@ -80,9 +85,13 @@ Primitive primitive_of(const Surfels& s, Found& found) {
   p.extent_min = 1e300;
   p.extent_max = -1e300;
   for (std::uint32_t i : found.support) {
-    const double t = p.axis.dot(s.position[i].cast<double>() - p.point);
-    p.extent_min = std::min(p.extent_min, t);
-    p.extent_max = std::max(p.extent_max, t);
+    Vec3 raw[3];
+    const int count = raw_points(s, i, raw);
+    for (int k = 0; k < count; ++k) {
+      const double t = p.axis.dot(raw[k] - p.point);
+      p.extent_min = std::min(p.extent_min, t);
+      p.extent_max = std::max(p.extent_max, t);
+    }
   }
   if (p.type == PrimitiveType::cylinder) {
     const double middle = 0.5 * (p.extent_min + p.extent_max);
@@ -106,12 +115,16 @@ Primitives segment(const Surfels& surfels, const SegmentationOptions& options) {
   const Limits limits = limits_of(surfels, scene, options);
   fill_ijk(surfels, out.spaces);
 
-  // Back and forth among the spaces on what is left, until a round explains nothing more.
   std::vector<Found> found;
+  if (surfels.mesh != nullptr) take_cad_faces(scene, found);
+
+  // Back and forth among the spaces on what is left, until a round explains nothing more.
   constexpr int kRounds = 3;
   for (int round = 0; round < kRounds; ++round) {
     const std::size_t before = found.size();
     find_planes(scene, limits, out.spaces, found);
+    // Flat cones of a CAD file would pass as cylinders of large radius; exact vertices let cones go first.
+    if (surfels.mesh != nullptr) find_cones_and_spheres(scene, limits, found);
     find_cylinders(scene, limits, out.spaces, found);
     find_cones_and_spheres(scene, limits, found);
     if (found.size() == before) break;

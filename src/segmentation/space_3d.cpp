@@ -10,22 +10,6 @@ constexpr double kRoundSlack = 4.0 * kDegree;  // the quadric's gradient on a ti
 constexpr double kShortArc = 60.0 * kDegree;   // below, a free radius means little: algorithms.md section 10
 constexpr double kMaxRmsSigma = 3.5;           // rms of cell means in sigmas: right ones 1-1.5, compromises > 4
 
-/// Arc of the support about the axis: the circle less its largest gap.
-double arc_of(const Surfels& s, const Indices& support, const Surface& surface) {
-  Vec3 u, v;
-  orthonormal_basis(surface.axis, u, v);
-  std::vector<double> angles;
-  angles.reserve(support.size());
-  for (std::uint32_t i : support) {
-    const Vec3 q = s.position[i].cast<double>() - surface.point;
-    angles.push_back(std::atan2(q.dot(v), q.dot(u)));
-  }
-  std::sort(angles.begin(), angles.end());
-  double gap = angles.front() + 2 * kPi - angles.back();
-  for (std::size_t i = 1; i < angles.size(); ++i) gap = std::max(gap, angles[i] - angles[i - 1]);
-  return 2 * kPi - gap;
-}
-
 struct Candidate {
   Fit fit;
   Indices support;
@@ -80,6 +64,27 @@ bool accepted(Scene& scene, const Indices& component, const Candidate& c, double
 }
 
 }  // namespace
+
+double arc_of(const Surfels& s, const Indices& support, const Surface& surface) {
+  Vec3 u, v;
+  orthonormal_basis(surface.axis, u, v);
+  std::vector<double> angles;
+  angles.reserve(support.size());
+  for (std::uint32_t i : support) {
+    Vec3 raw[3];
+    const int count = raw_points(s, i, raw);
+    for (int k = 0; k < count; ++k) {
+      const Vec3 q = raw[k] - surface.point;
+      angles.push_back(std::atan2(q.dot(v), q.dot(u)));
+    }
+  }
+  std::sort(angles.begin(), angles.end());
+  double gap = angles.front() + 2 * kPi - angles.back();
+  for (std::size_t i = 1; i < angles.size(); ++i) gap = std::max(gap, angles[i] - angles[i - 1]);
+  // On a mesh the largest step between facets' corners is no gap.
+  if (s.mesh != nullptr && gap < 40 * kDegree) return 2 * kPi;
+  return 2 * kPi - gap;
+}
 
 std::optional<Found> explain_round(Scene& scene, const Indices& component, const Vec3& axis, const Limits& limits) {
   const Surfels& s = scene.surfels;

@@ -38,6 +38,9 @@ void find_cones_and_spheres(Scene& scene, const Limits& limits, std::vector<Foun
 /// truth.
 std::optional<Found> explain_round(Scene& scene, const Indices& component, const Vec3& axis, const Limits& limits);
 
+/// Arc of the support about the surface's axis [rad]: the circle less its largest gap.
+double arc_of(const Surfels& surfels, const Indices& support, const Surface& surface);
+
 /// Takes the support: labels it with the number that `found` will have.
 void take(Scene& scene, std::vector<Found>& found, Found&& next);
 
