@@ -1,3 +1,4 @@
+#include <Adaptor3d_Curve.hxx>
 #include <BRepAdaptor_Surface.hxx>
 #include <BRepGProp.hxx>
 #include <BRepTools.hxx>
@@ -6,11 +7,13 @@
 #include <TopoDS.hxx>
 #include <TopoDS_Face.hxx>
 #include <cmath>
+#include <gp_Circ.hxx>
 #include <gp_Cone.hxx>
 #include <gp_Cylinder.hxx>
 #include <gp_Pln.hxx>
 #include <gp_Sphere.hxx>
 #include <gp_Torus.hxx>
+#include <optional>
 
 #include "cad_exchange/recognize_surface.hpp"
 #include "cad_exchange/shape_mesh.hpp"
@@ -70,6 +73,25 @@ Vec3 outwards(const CadFace& f, const Vec3& p) {
   }
 }
 
+/// A circle that turns about a line in its plane is a torus, though some writers call it a surface of revolution.
+std::optional<CadFace> as_torus(const BRepAdaptor_Surface& surface, double tolerance) {
+  const Handle(Adaptor3d_Curve) curve = surface.BasisCurve();
+  if (curve->GetType() != GeomAbs_Circle) return {};
+  const gp_Circ circle = curve->Circle();
+  const gp_Ax1 axis = surface.AxeOfRevolution();
+  CadFace f;
+  f.type = SurfaceType::torus;
+  f.axis = vec(axis.Direction());
+  const Vec3 centre = vec(circle.Location()), normal = vec(circle.Axis().Direction());
+  const Vec3 origin = vec(axis.Location());
+  f.point = origin + (centre - origin).dot(f.axis) * f.axis;
+  f.radius_mm = (centre - f.point).norm();
+  f.minor_radius_mm = circle.Radius();
+  const bool in_plane = std::abs(normal.dot(f.axis)) * f.minor_radius_mm < tolerance &&
+                        std::abs(normal.dot(centre - f.point)) < tolerance;
+  return in_plane ? std::optional(f) : std::nullopt;
+}
+
 /// Type and parameters, without what depends on the side of the material.
 CadFace bare_face(const TopoDS_Face& face, const BRepAdaptor_Surface& surface, double tolerance) {
   CadFace f;
@@ -103,6 +125,9 @@ CadFace bare_face(const TopoDS_Face& face, const BRepAdaptor_Surface& surface, d
       f.radius_mm = surface.Torus().MajorRadius();
       f.minor_radius_mm = surface.Torus().MinorRadius();
       return f;
+    case GeomAbs_SurfaceOfRevolution:
+      if (const std::optional<CadFace> torus = as_torus(surface, tolerance)) return *torus;
+      [[fallthrough]];
     default:
       // Open CASCADE's own conversion (ShapeCustom::SweptToElementary) crashes on some files and knows no splines.
       return recognize_surface(surface_grid(face, surface, 8), tolerance);

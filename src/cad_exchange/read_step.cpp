@@ -19,6 +19,7 @@
 
 #include "cad_exchange/shape_mesh.hpp"
 #include "tribin/core/error.hpp"
+#include "tribin/io/cad_files.hpp"
 
 namespace tribin {
 namespace {
@@ -109,6 +110,14 @@ Mesh read_iges(const std::string& path, const TessellationOptions& options) {
   check(options);
   check_start(path, "S", 72, "an IGES file (\"S\" in column 73)");
   return read<IGESControl_Reader>(path, options, "an IGES file");
+}
+
+void register_cad_exchange() {
+  // The unit is the file's own: CadReadOptions::unit is for formats without one.
+  for (const char* extension : {".step", ".stp"})
+    register_cad_reader(extension, [](const auto& path, const CadReadOptions&) { return read_step(path.string()); });
+  for (const char* extension : {".iges", ".igs"})
+    register_cad_reader(extension, [](const auto& path, const CadReadOptions&) { return read_iges(path.string()); });
 }
 
 }  // namespace tribin

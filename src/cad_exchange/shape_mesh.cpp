@@ -15,6 +15,8 @@
 #include <cstdint>
 #include <unordered_map>
 
+#include "cad_exchange/torus_mesh.hpp"
+
 namespace tribin::detail {
 namespace {
 
@@ -141,7 +143,12 @@ Mesh mesh_of_shape(const TopoDS_Shape& shape, const TessellationOptions& options
                             " mm");
   }
   // One thread: the same triangles in the same order on every machine.
-  BRepMesh_IncrementalMesh(shape, mesh.chord_error_mm, /*isRelative=*/false, options.angle, /*isInParallel=*/false);
+  BRepMesh_IncrementalMesh mesher;
+  mesher.SetShape(shape);
+  mesher.ChangeParameters().Deflection = mesh.chord_error_mm;
+  mesher.ChangeParameters().Angle = options.angle;
+  mesher.ChangeParameters().InParallel = false;
+  mesher.Perform(mesh_context());
   // A twentieth of the chord error joins the two sides of an edge and is far below any edge that is meant to be there.
   Welder welder(mesh.chord_error_mm / 20);
   for (TopExp_Explorer solids(shape, TopAbs_SOLID); solids.More(); solids.Next())

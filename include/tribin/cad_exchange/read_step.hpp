@@ -24,4 +24,7 @@ Mesh read_step(const std::string& path, const TessellationOptions& options = {})
 /// Reads an IGES file (B-rep solids or loose faces; loose faces are sewn). As read_step else.
 Mesh read_iges(const std::string& path, const TessellationOptions& options = {});
 
+/// Makes read_cad read .step, .stp, .iges and .igs. A program calls it once, before it reads any file.
+void register_cad_exchange();
+
 }  // namespace tribin
