@@ -145,20 +145,28 @@ void SurfaceIndex::build_nodes() {
   std::vector<int> order(count);
   std::iota(order.begin(), order.end(), 0);
   nodes_.reserve(count);
-  nodes_.push_back({{}, {}, 0, count});
+  nodes_.push_back({{}, {}, {}, {}, 0, count});
   for (std::size_t at = 0; at < nodes_.size(); ++at) {
     const int first = nodes_[at].first, size = nodes_[at].count;
-    Vec3f low = Vec3f::Constant(std::numeric_limits<float>::max()), high = -low, middle_low = low, middle_high = high;
+    Vec3f low = Vec3f::Constant(std::numeric_limits<float>::max()), high = -low, middle_low = low, middle_high = high,
+          normal_low = low, normal_high = high;
     for (int i = first; i < first + size; ++i) {
       const Triangle& t = triangles_[order[i]];
       for (const Vec3& p : {t.a, Vec3(t.a + t.ab), Vec3(t.a + t.ac)}) {
         low = low.cwiseMin(p.cast<float>());
         high = high.cwiseMax(p.cast<float>());
       }
+      normal_low = normal_low.cwiseMin(t.normal.cast<float>());
+      normal_high = normal_high.cwiseMax(t.normal.cast<float>());
       middle_low = middle_low.cwiseMin(middle[order[i]]);
       middle_high = middle_high.cwiseMax(middle[order[i]]);
     }
-    for (int k = 0; k < 3; ++k) nodes_[at].low[k] = low[k], nodes_[at].high[k] = high[k];
+    for (int k = 0; k < 3; ++k) {
+      nodes_[at].low[k] = low[k];
+      nodes_[at].high[k] = high[k];
+      nodes_[at].normal_low[k] = normal_low[k];
+      nodes_[at].normal_high[k] = normal_high[k];
+    }
     if (size <= kLeafSize) continue;
     int axis = 0;
     (middle_high - middle_low).maxCoeff(&axis);
@@ -168,8 +176,8 @@ void SurfaceIndex::build_nodes() {
     });
     nodes_[at].first = static_cast<int>(nodes_.size());
     nodes_[at].count = 0;
-    nodes_.push_back({{}, {}, first, half - first});
-    nodes_.push_back({{}, {}, half, first + size - half});
+    nodes_.push_back({{}, {}, {}, {}, first, half - first});
+    nodes_.push_back({{}, {}, {}, {}, half, first + size - half});
   }
   std::vector<Triangle> sorted(count);
   for (int i = 0; i < count; ++i) sorted[i] = triangles_[order[i]];
@@ -178,13 +186,25 @@ void SurfaceIndex::build_nodes() {
 
 /// Calls visit(triangle index) -> squared radius to go on with (negative: stop), nearer boxes first.
 template <class Visit>
-void SurfaceIndex::visit_within(const Vec3& p, double radius_mm, Visit&& visit) const {
+void SurfaceIndex::visit_within(const Vec3& p, const Vec3& n, double radius_mm, double min_cos, Visit&& visit) const {
   const float x = static_cast<float>(p.x()), y = static_cast<float>(p.y()), z = static_cast<float>(p.z());
   const auto squared_distance = [x, y, z](const Node& node) {
     const float dx = std::max(std::max(node.low[0] - x, x - node.high[0]), 0.0f);
     const float dy = std::max(std::max(node.low[1] - y, y - node.high[1]), 0.0f);
     const float dz = std::max(std::max(node.low[2] - z, z - node.high[2]), 0.0f);
     return dx * dx + dy * dy + dz * dz;
+  };
+  const float nx = static_cast<float>(n.x()), ny = static_cast<float>(n.y()), nz = static_cast<float>(n.z());
+  const float least_cos = static_cast<float>(min_cos) - 1e-5f;
+  const auto may_face = [&](const Node& node) {
+    const float highest = std::max(nx * node.normal_low[0], nx * node.normal_high[0]) +
+                          std::max(ny * node.normal_low[1], ny * node.normal_high[1]) +
+                          std::max(nz * node.normal_low[2], nz * node.normal_high[2]);
+    if (highest >= least_cos || oriented_) return highest >= least_cos;
+    const float lowest = std::min(nx * node.normal_low[0], nx * node.normal_high[0]) +
+                         std::min(ny * node.normal_low[1], ny * node.normal_high[1]) +
+                         std::min(nz * node.normal_low[2], nz * node.normal_high[2]);
+    return -lowest >= least_cos;
   };
   double limit = radius_mm * radius_mm;
   struct Entry {
@@ -208,14 +228,14 @@ void SurfaceIndex::visit_within(const Vec3& p, double radius_mm, Visit&& visit) 
     Entry near{node.first, squared_distance(nodes_[node.first])};
     Entry far{node.first + 1, squared_distance(nodes_[node.first + 1])};
     if (far.squared < near.squared) std::swap(near, far);
-    if (far.squared <= limit) stack[top++] = far;
-    if (near.squared <= limit) stack[top++] = near;
+    if (far.squared <= limit && may_face(nodes_[far.node])) stack[top++] = far;
+    if (near.squared <= limit && may_face(nodes_[near.node])) stack[top++] = near;
   }
 }
 
 bool SurfaceIndex::has_near(const Vec3& p, const Vec3& n, double radius_mm, double min_cos) const {
   bool found = false;
-  visit_within(p, radius_mm, [&](int i, double limit) {
+  visit_within(p, n, radius_mm, min_cos, [&](int i, double limit) {
     const Triangle& t = triangles_[i];
     const double cosine = t.normal.dot(n);
     if ((oriented_ ? cosine : std::abs(cosine)) < min_cos) return limit;
@@ -230,7 +250,7 @@ bool SurfaceIndex::has_near(const Vec3& p, const Vec3& n, double radius_mm, doub
 
 SurfaceHit SurfaceIndex::nearest(const Vec3& p, const Vec3& n, double radius_mm, double min_cos) const {
   SurfaceHit hit;
-  visit_within(p, radius_mm, [&](int i, double limit) {
+  visit_within(p, n, radius_mm, min_cos, [&](int i, double limit) {
     const Triangle& t = triangles_[i];
     const double cosine = t.normal.dot(n);
     if ((oriented_ ? cosine : std::abs(cosine)) < min_cos) return limit;

@@ -49,11 +49,12 @@ class SurfaceIndex {
   };
   struct Node {
     float low[3], high[3];
+    float normal_low[3], normal_high[3];  ///< of the facets below: a whole branch may face the wrong way
     std::int32_t first = 0,
                  count = 0;  ///< leaf: triangles first .. first + count; inner (count 0): children first, first + 1
   };
   template <class Visit>
-  void visit_within(const Vec3& p, double radius_mm, Visit&& visit) const;
+  void visit_within(const Vec3& p, const Vec3& n, double radius_mm, double min_cos, Visit&& visit) const;
   void measure_facets(const Mesh& mesh, const std::vector<int>& kept);
   void build_nodes();
 

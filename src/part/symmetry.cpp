@@ -199,7 +199,7 @@ class Search {
 
   void follow_folds(const Axis& axis) {
     const auto overlap_at = [&](double angle, double floor) {
-      return overlap_of(surface_, first(2 * kPolishSamples), turn(axis, angle), fine_, floor);
+      return overlap_of(surface_, first(kPolishSamples), turn(axis, angle), fine_, floor);
     };
     int best_fold = 0;
     double best = 0.8;

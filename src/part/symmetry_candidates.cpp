@@ -84,7 +84,6 @@ Vec3 meeting_point(std::span<const SurfaceSample> samples, const Vec3& direction
     point = a.ldlt().solve(b);
     scale_mm = std::max(0.7 * scale_mm, 1e-6);
     point -= direction * direction.dot(point - start);
-    if (iteration >= 8) continue;
   }
   return point;
 }
@@ -194,16 +193,20 @@ std::vector<Candidate> scan_turns(const SurfaceIndex& surface, std::span<const S
   std::vector<Candidate> best;
   for (const bool flipped : {false, true}) {
     const Pose base = flipped ? turn({u, axis.point}, kPi) : Pose::Identity();
+    // A turn and the one back keep the same share in place: half of the circle is enough. Not so after a half turn.
+    const int last = flipped ? kScanSteps - 1 : kScanSteps / 2;
     std::vector<Candidate> tried(kScanSteps);
-    for (int i = 0; i < kScanSteps; ++i) {
+    for (int i = 0; i <= last; ++i) {
       tried[i].motion = turn(axis, 2 * kPi * i / kScanSteps) * base;
       tried[i].overlap = !flipped && i == 0 ? 1 : overlap_of(surface, samples, tried[i].motion, nearness, min_overlap);
     }
-    for (int i = flipped ? 0 : 1; i < kScanSteps; ++i) {
-      const double before = tried[(i + kScanSteps - 1) % kScanSteps].overlap;
-      const double after = tried[(i + 1) % kScanSteps].overlap;
-      if (tried[i].overlap < min_overlap || tried[i].overlap < before || tried[i].overlap < after) continue;
-      if (tried[i].overlap == before && i % 3 != 0) continue;  // a plateau: a few of it are enough
+    const auto overlap = [&](int i) {
+      const int k = (i + kScanSteps) % kScanSteps;
+      return tried[k > last ? kScanSteps - k : k].overlap;
+    };
+    for (int i = flipped ? 0 : 1; i <= last; ++i) {
+      if (overlap(i) < min_overlap || overlap(i) < overlap(i - 1) || overlap(i) < overlap(i + 1)) continue;
+      if (overlap(i) == overlap(i - 1) && i % 3 != 0) continue;  // a plateau: a few of it are enough
       best.push_back(tried[i]);
     }
   }

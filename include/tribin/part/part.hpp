@@ -18,7 +18,7 @@ struct ContinuousSymmetry {
 /// The rigid motions that leave the part as it is (part_from_part).
 struct SymmetryGroup {
   std::vector<Pose> discrete;                   ///< with the identity first
-  std::vector<ContinuousSymmetry> continuous;   ///< none or one
+  std::vector<ContinuousSymmetry> continuous;   ///< none or one; three for a ball
 };
 
 /// A pose that leaves most of the surface in place, and what tells it from the true one.
