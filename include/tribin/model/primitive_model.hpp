@@ -6,7 +6,7 @@
 
 namespace tribin {
 
-enum class RelationType : std::uint8_t { plane_plane, plane_cylinder, cylinder_cylinder };
+enum class RelationType : std::uint8_t { plane_plane, plane_cylinder, cylinder_cylinder };  ///< cones count as cylinders
 
 /// How two primitives lie to each other, and where they meet.
 struct Relation {
