@@ -149,7 +149,8 @@ void write_camera_file(const std::filesystem::path& path, const CameraFile& file
 
 Image<Vec3f> undistorted_rays(const CameraFile& file) {
   const PinholeCamera& c = file.camera;
-  const auto [k1, k2, p1, p2, k3] = file.distortion;
+  const double k1 = file.distortion[0], k2 = file.distortion[1], p1 = file.distortion[2], p2 = file.distortion[3],
+               k3 = file.distortion[4];
   Image<Vec3f> rays(c.width, c.height);
   parallel_ranges(c.height, 64, [&](int begin, int end) {
     for (int v = begin; v < end; ++v) {

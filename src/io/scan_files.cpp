@@ -24,7 +24,8 @@ Content content_of_array(const std::filesystem::path& path, const FileBytes& fil
   depth.width = array.width;
   depth.height = array.height;
   depth.data = std::move(array.values);
-  return io::scan_from_floats(file.name, std::move(depth), io::camera_of_image(path, options), options.unit);
+  const CameraFile camera = io::camera_of_image(path, options);
+  return io::scan_from_floats(file.name, std::move(depth), camera, options.unit);
 }
 
 Content read_content(const std::filesystem::path& path, const ScanReadOptions& options) {
@@ -36,8 +37,10 @@ Content read_content(const std::filesystem::path& path, const ScanReadOptions& o
     io::bad_file(path.string(), "", "extension " + io::in_quotes(extension), "a scan (" + list + ")");
   }
   const FileBytes file = io::read_file(path);
-  if (extension == ".png")
-    return io::scan_from_steps(file.name, io::decode_png16(file), io::camera_of_image(path, options));
+  if (extension == ".png") {
+    const auto steps = io::decode_png16(file);  // before the camera is looked for: it may not be a depth image at all
+    return io::scan_from_steps(file.name, steps, io::camera_of_image(path, options));
+  }
   if (extension == ".pcd") return io::parse_pcd(file);
   if (extension == ".ply") return io::parse_ply_cloud(file);
   if (extension == ".npy") return content_of_array(path, file, io::parse_npy(file), options);
