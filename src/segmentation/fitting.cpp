@@ -9,6 +9,7 @@ namespace tribin::segmentation_detail {
 namespace {
 
 constexpr int kParameters = 6;
+constexpr double kMadToSigma = 1.4826;  // of a normal distribution
 using Square = Eigen::Matrix<double, kParameters, kParameters>;
 using Column = Eigen::Matrix<double, kParameters, 1>;
 
@@ -33,7 +34,8 @@ Row linearise(const Surface& s, const Vec3& u, const Vec3& v, const Vec3& p) {
   const Vec3 across = q - s.axis * t;
   const double r = across.norm();
   const Vec3 e = across / std::max(r, 1e-9);
-  const double c = std::cos(s.half_angle), sn = std::sin(s.half_angle);
+  const bool cone = s.half_angle != 0;
+  const double c = cone ? std::cos(s.half_angle) : 1.0, sn = cone ? std::sin(s.half_angle) : 0.0;
   const double eu = e.dot(u), ev = e.dot(v);
   row.residual = (r - s.radius) * c - t * sn;
   // A tilt w moves the axis by w x a: about u by -v, about v by +u. The distance from the axis changes by -t (e . da),
@@ -120,6 +122,14 @@ double median_of(std::vector<double>& values) {
   return *middle;
 }
 
+/// residual_scale() of the sample.
+double scale_of(const Surface& s, const Sampled& data, double limit, std::vector<double>& scratch) {
+  scratch.clear();
+  for (std::size_t i = 0; i < data.points.size(); ++i)
+    scratch.push_back(std::abs(s.distance(data.points[i])) * data.inverse_sigma[i]);
+  return std::clamp(kMadToSigma * median_of(scratch), 1.0, std::max(1.0, limit));
+}
+
 /// How much less than white noise the cells' means average down (surfel stage: 4 pi c^2 against one cell's own share).
 double correlation_inflation(const Surfels& s) {
   if (s.scan == nullptr || s.correlation_px <= 0) return 1;
@@ -163,7 +173,7 @@ double residual_scale(const Surfels& surfels, std::span<const std::uint32_t> sup
   }
   if (residuals.empty()) return 1;
   const double limit = std::sqrt(points / static_cast<double>(residuals.size()));
-  return std::clamp(1.4826 * median_of(residuals), 1.0, std::max(1.0, limit));
+  return std::clamp(kMadToSigma * median_of(residuals), 1.0, std::max(1.0, limit));
 }
 
 Fit fit_plane(const Surfels& surfels, std::span<const std::uint32_t> support) {
@@ -239,11 +249,13 @@ Fit fit_round(const Surfels& surfels, std::span<const std::uint32_t> support, co
     h.setZero();
     g.setZero();
     double cost = 0;
+    const int used = options.cone ? kParameters : kParameters - 1;
     for (std::size_t i = 0; i < data.points.size(); ++i) {
       const Row row = linearise(at, u, v, data.points[i]);
       const double e = row.residual * data.inverse_sigma[i];
       const double weight = robust_weight(e, mu) * data.inverse_sigma[i] * data.inverse_sigma[i];
-      h.selfadjointView<Eigen::Lower>().rankUpdate(row.jacobian, weight);
+      for (int a = 0; a < used; ++a)
+        for (int b = 0; b <= a; ++b) h(a, b) += weight * row.jacobian[a] * row.jacobian[b];
       g += weight * row.residual * row.jacobian;
       cost += mu * mu * e * e / (mu * mu + e * e);
     }
@@ -256,7 +268,11 @@ Fit fit_round(const Surfels& surfels, std::span<const std::uint32_t> support, co
   std::vector<double> sigmas;
   for (double i : data.inverse_sigma) sigmas.push_back(1.0 / i);
   const double sigma = median_of(sigmas);
-  double mu = std::max(3.0 * residual_scale(surfels, support, s), options.start_mm / sigma);
+  double points = 0;
+  for (std::uint32_t i : support) points += surfels.points[i];
+  const double scale_limit = std::sqrt(points / static_cast<double>(support.size()));
+  std::vector<double> scratch;
+  double mu = std::max(3.0 * scale_of(s, data, scale_limit, scratch), options.start_mm / sigma);
   double lambda = 1e-4;
   Square h;
   Column g;
@@ -282,7 +298,7 @@ Fit fit_round(const Surfels& surfels, std::span<const std::uint32_t> support, co
         lambda *= 10;
       }
     }
-    const double target = 3.0 * residual_scale(surfels, support, s);
+    const double target = 3.0 * scale_of(s, data, scale_limit, scratch);
     const bool shrinking = mu > 1.05 * target;
     if (shrinking) mu = std::max(target, 0.5 * mu);
     settled = !shrinking && (!improved || step < 0.02) ? settled + 1 : 0;

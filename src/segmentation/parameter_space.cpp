@@ -27,18 +27,39 @@ std::vector<float> spread(const DirectionBins& bins, const std::vector<float>& v
   return out;
 }
 
-/// Ruling votes of all free ruled surfels, each with a kernel of its own width.
-std::vector<float> vote_rulings(const Scene& scene, const std::vector<std::uint8_t>& dead) {
+/// A ruled surfel as parameter space sees it.
+struct Ruled {
+  std::uint32_t surfel;
+  std::uint16_t bin;
+  std::uint8_t width;        ///< which kernel
+  float cos_gate, sin_gate;  ///< how far its ruling may lie from an axis: the peak's width and its own noise
+  bool dead = false;         ///< of a peak that was looked at
+};
+
+std::vector<Ruled> ruled_surfels(const Scene& scene) {
   const Surfels& s = scene.surfels;
+  const DirectionBins& bins = axis_bins();
+  std::vector<Ruled> out;
+  for (std::uint32_t i = 0; i < s.size(); ++i) {
+    if (!scene.free(i) || s.shape[i] != SurfelShape::ruled) continue;
+    const double sigma = sigma_ruling(s, i);
+    const double gate = kGather + 2.0 * std::min(sigma, 6 * kDegree);
+    out.push_back({i, static_cast<std::uint16_t>(bins.find(s.direction2[i])),
+                   static_cast<std::uint8_t>(sigma < 3 * kDegree   ? 0
+                                             : sigma < 6 * kDegree ? 1
+                                                                   : 2),
+                   static_cast<float>(std::cos(gate)), static_cast<float>(std::sin(gate))});
+  }
+  return out;
+}
+
+/// Ruling votes of all that are still free, each with a kernel of its own width.
+std::vector<float> vote_rulings(const Scene& scene, const std::vector<Ruled>& ruled) {
   const DirectionBins& bins = axis_bins();
   std::vector<float> by_width[kWidths];
   for (auto& v : by_width) v.assign(bins.center.size(), 0.0f);
-  for (std::uint32_t i = 0; i < s.size(); ++i) {
-    if (!scene.free(i) || dead[i] || s.shape[i] != SurfelShape::ruled) continue;
-    const double sigma = sigma_ruling(s, i);
-    const int width = sigma < 3 * kDegree ? 0 : sigma < 6 * kDegree ? 1 : 2;
-    by_width[width][bins.find(s.direction2[i])] += s.area_mm2[i];
-  }
+  for (const Ruled& r : ruled)
+    if (!r.dead && scene.free(r.surfel)) by_width[r.width][r.bin] += scene.surfels.area_mm2[r.surfel];
   std::vector<float> total = by_width[kWidths - 1];
   for (int w = kWidths - 1; w >= 0; --w) {
     total = spread(bins, total);
@@ -53,13 +74,13 @@ std::vector<float> vote_rulings(const Scene& scene, const std::vector<std::uint8
 void find_cylinders(Scene& scene, const Limits& limits, HoughSpaces& spaces, std::vector<Found>& found) {
   const Surfels& s = scene.surfels;
   const DirectionBins& bins = axis_bins();
-  std::vector<std::uint8_t> dead(s.size(), 0);
-  if (spaces.parameter.empty()) spaces.parameter = vote_rulings(scene, dead);
+  std::vector<Ruled> ruled = ruled_surfels(scene);
+  if (spaces.parameter.empty()) spaces.parameter = vote_rulings(scene, ruled);
   const std::size_t least = std::max<std::size_t>(4, limits.min_surfels / 3);
 
   constexpr int kMaxPeaks = 400;  // each kills its members, so this only guards against a fault
   for (int round = 0; round < kMaxPeaks; ++round) {
-    const std::vector<float> votes = vote_rulings(scene, dead);
+    const std::vector<float> votes = vote_rulings(scene, ruled);
     const auto best = static_cast<std::size_t>(std::max_element(votes.begin(), votes.end()) - votes.begin());
     // The kernels spread a cylinder's votes over some twenty bins.
     if (votes[best] <= 0 || votes[best] < 0.02 * limits.min_area_mm2) break;
@@ -70,12 +91,12 @@ void find_cylinders(Scene& scene, const Limits& limits, HoughSpaces& spaces, std
       Matrix3 scatter = Matrix3::Zero();
       members.clear();
       gathered = 0;
-      for (std::uint32_t i = 0; i < s.size(); ++i) {
-        if (!scene.free(i) || dead[i] || s.shape[i] != SurfelShape::ruled) continue;
+      const Vec3f direction = axis.cast<float>();
+      for (const Ruled& r : ruled) {
+        const std::uint32_t i = r.surfel;
+        if (r.dead || !scene.free(i) || std::abs(s.direction2[i].dot(direction)) < r.cos_gate) continue;
+        if (std::abs(s.normal[i].dot(direction)) > r.sin_gate) continue;
         const Vec3 d = s.direction2[i].cast<double>();
-        const double gate = kGather + 2.0 * std::min(sigma_ruling(s, i), 6 * kDegree);
-        if (std::abs(d.dot(axis)) < std::cos(gate)) continue;
-        if (std::abs(s.normal[i].cast<double>().dot(axis)) > std::sin(gate)) continue;
         members.push_back(i);
         scatter += s.area_mm2[i] * d * d.transpose();
         gathered += s.area_mm2[i];
@@ -110,8 +131,10 @@ void find_cylinders(Scene& scene, const Limits& limits, HoughSpaces& spaces, std
       }
     }
     if (any) spaces.peaks.push_back(peak);
-    for (std::uint32_t i : members) dead[i] = 1;
     if (members.empty()) break;
+    std::size_t at = 0;  // members are in the order of `ruled`
+    for (Ruled& r : ruled)
+      if (at < members.size() && r.surfel == members[at]) r.dead = true, ++at;
   }
 }
 

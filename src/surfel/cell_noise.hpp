@@ -24,10 +24,11 @@ struct ThirdDifferences {
   double sigma_mm = 0;
   double correlation_px = 0;
 };
-ThirdDifferences noise_from_third_differences(const Scan& scan);
+ThirdDifferences noise_from_third_differences(const Scan& scan, const Image<float>& quantisation_steps);
 
-/// The step between neighbouring depth values in each tile of `tile_px` x `tile_px` pixels [mm]; near 0 where depth is
+/// The step between neighbouring depth values in each tile of kQuantisationTile^2 pixels [mm]; near 0 where depth is
 /// not coarsely quantised. Structured-light and disparity cameras store steps that can exceed their noise.
-Image<float> quantisation_steps(const Scan& scan, int tile_px);
+inline constexpr int kQuantisationTile = 32;
+Image<float> quantisation_steps(const Scan& scan);
 
 }  // namespace tribin::surfel_detail

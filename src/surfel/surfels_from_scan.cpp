@@ -51,7 +51,9 @@ Image<float> local_noise(const CellGrid& grid, const CellNoise& noise, const Ima
         auto low = residuals.begin() + static_cast<std::ptrdiff_t>(3 * residuals.size() / 10);
         std::nth_element(residuals.begin(), low, residuals.end());
         const double measured = *low / noise.residual_quantile;
-        const double step = steps(tile_column, tile_row);
+        const int middle = kTileCells * grid.cell_px, half = middle / 2;
+        const double step = steps(std::min((tile_column * middle + half) / kQuantisationTile, steps.width - 1),
+                                  std::min((tile_row * middle + half) / kQuantisationTile, steps.height - 1));
         sigma(tile_column, tile_row) = static_cast<float>(std::sqrt(measured * measured + step * step / 12.0));
       }
   });
@@ -96,7 +98,8 @@ std::vector<float> accept_cells(const CellGrid& grid, const Image<float>& sigma_
         // A surface of radius 1.5 cell widths, the tightest that cells can follow, bends by this rms inside a cell.
         const double width = grid.cell_px * z * pixel_pitch;
         const double bend = width / (27.0 * 1.5) * to_d;
-        const double limit = std::hypot(noise.residual_limit * 1.2 * sigma, bend);  // 1.2: the local sigma's own error
+        const double noisy = noise.residual_limit * 1.2 * sigma;  // 1.2: the local sigma's own error
+        const double limit = std::sqrt(noisy * noisy + bend * bend);
         if (grid.residual[cell] <= limit) accepted[cell] = static_cast<float>(sigma);
       }
   });
@@ -308,7 +311,7 @@ double median_depth(const Scan& scan) {
 
 NoiseProfile estimate_noise(const Scan& scan) {
   NoiseProfile profile = scan.noise;
-  const ThirdDifferences measured = noise_from_third_differences(scan);
+  const ThirdDifferences measured = noise_from_third_differences(scan, quantisation_steps(scan));
   profile.sigma_mm = measured.sigma_mm;
   profile.correlation_px = measured.correlation_px;
   return profile;
@@ -324,7 +327,8 @@ Surfels surfels_from_scan(const Scan& scan, const SurfelOptions& options) {
     throw Error(ErrorCode::bad_option,
                 "cell_px is " + std::to_string(options.cell_px) + ", wanted 2 to 16, or 0 for automatic");
 
-  ThirdDifferences typical = noise_from_third_differences(scan);
+  const Image<float> steps = quantisation_steps(scan);
+  ThirdDifferences typical = noise_from_third_differences(scan, steps);
   if (scan.noise.correlation_px >= 0) typical.correlation_px = scan.noise.correlation_px;
   if (scan.noise.sigma_mm > 0) typical.sigma_mm = scan.noise.sigma_mm;
   const double pitch = median_depth(scan) / std::max(scan.camera.fx, scan.camera.fy);
@@ -336,7 +340,7 @@ Surfels surfels_from_scan(const Scan& scan, const SurfelOptions& options) {
   s.scan = &scan;
   s.cell_px = n;
   s.correlation_px = typical.correlation_px;
-  s.local_sigma_mm = local_noise(grid, noise, quantisation_steps(scan, n * kTileCells));
+  s.local_sigma_mm = local_noise(grid, noise, steps);
   const std::vector<float> sigma_d =
       accept_cells(grid, s.local_sigma_mm, noise, 1.0 / std::min(scan.camera.fx, scan.camera.fy));
   const Quadrics quadrics = fit_quadrics(grid, sigma_d, noise);
