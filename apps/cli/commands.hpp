@@ -1,0 +1,55 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "tribin/io/scan_files.hpp"
+#include "tribin/part/part.hpp"
+
+namespace tribin::cli {
+
+/// What all commands share.
+struct Context {
+  bool quiet = false;
+  bool verbose = false;
+  bool expert = false;               ///< --expert was given: the derived settings may be set by hand
+  int threads = 0;                   ///< 0 = all cores
+  std::vector<std::string> command;  ///< argv, for the report's "run it again"
+  std::function<int()> run;          ///< set by the chosen command; returns the exit code
+};
+
+// Each command is one file: it declares its options and sets Context::run when it is chosen.
+void add_locate(CLI::App& app, Context& context);
+void add_segment(CLI::App& app, Context& context);
+void add_normals(CLI::App& app, Context& context);
+void add_part(CLI::App& app, Context& context);
+void add_convert(CLI::App& app, Context& context);
+void add_simulate(CLI::App& app, Context& context);
+void add_bench(CLI::App& app, Context& context);
+
+// Shared by the commands (inputs.cpp).
+
+/// A subcommand with -q, -v, --threads, --expert and an example under its help.
+CLI::App* add_command(CLI::App& app, Context& context, const std::string& name, const std::string& what,
+                      const std::string& example);
+/// An option that stands behind --expert: hidden and refused without it.
+void only_experts(CLI::Option* option, Context& context);
+
+struct PartArgument {
+  std::string name;
+  std::filesystem::path file;
+};
+/// Takes "[NAME=]CAD" apart; the name is the file's stem where none is given.
+/// \throws Error bad_option for two equal names.
+std::vector<PartArgument> part_arguments(const std::vector<std::string>& arguments);
+
+/// Reads and compiles the parts; their warnings go to the log.
+std::vector<Part> read_parts(const std::vector<PartArgument>& arguments, const std::string& unit);
+
+/// Reads an organized scan and logs its warnings.
+Scan read_scan_logged(const std::filesystem::path& scan, const std::string& camera, const std::string& unit);
+
+}  // namespace tribin::cli

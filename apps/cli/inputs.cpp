@@ -1,0 +1,69 @@
+#include <set>
+
+#include "commands.hpp"
+#include "tribin/core/error.hpp"
+#include "tribin/core/log.hpp"
+#include "tribin/io/cad_files.hpp"
+
+namespace tribin::cli {
+
+CLI::App* add_command(CLI::App& app, Context& context, const std::string& name, const std::string& what,
+                      const std::string& example) {
+  CLI::App* command = app.add_subcommand(name, what);
+  command->footer("Example:\n  " + example);
+  command->add_flag("-q,--quiet", context.quiet, "No warnings, no progress");
+  command->add_flag("-v,--verbose", context.verbose, "Say more on stderr");
+  command->add_option("--threads", context.threads, "Threads to use, 0 = all cores; never changes a result")
+      ->check(CLI::Range(0, 1024))
+      ->type_name("N");
+  command->add_flag("--expert", context.expert, "Allow what is otherwise derived to be set (see docs/cli.md)");
+  return command;
+}
+
+void only_experts(CLI::Option* option, Context& context) {
+  option->group("");  // not in --help
+  const std::string name = option->get_name();
+  option->check(CLI::Validator(
+      [&context, name](std::string&) {
+        return context.expert ? std::string() : "stands behind --expert; give --expert first";
+      },
+      ""));
+}
+
+std::vector<PartArgument> part_arguments(const std::vector<std::string>& arguments) {
+  std::vector<PartArgument> out;
+  std::set<std::string> names;
+  for (const std::string& argument : arguments) {
+    PartArgument part{"", argument};
+    const std::size_t equals = argument.find('=');
+    if (equals != std::string::npos && argument.find('/') > equals) {  // a '=' in a folder's name is no NAME=
+      part = {argument.substr(0, equals), argument.substr(equals + 1)};
+      if (part.name.empty()) throw Error(ErrorCode::bad_option, "--part " + argument + ": no name before the '='");
+    }
+    if (part.name.empty()) part.name = part.file.stem().string();
+    if (!names.insert(part.name).second)
+      throw Error(ErrorCode::bad_option,
+                  "--part " + argument + ": two parts are named '" + part.name + "'; give one another name by --part NAME=CAD");
+    out.push_back(part);
+  }
+  return out;
+}
+
+std::vector<Part> read_parts(const std::vector<PartArgument>& arguments, const std::string& unit) {
+  std::vector<Part> parts;
+  for (const PartArgument& argument : arguments) {
+    const Mesh mesh = read_cad(argument.file, {.unit = length_unit_from_name(unit)});
+    parts.push_back(compile_part(mesh, {.name = argument.name}));
+    for (const std::string& warning : parts.back().warnings)
+      log(LogLevel::warning, argument.file.filename().string() + ": " + warning);
+  }
+  return parts;
+}
+
+Scan read_scan_logged(const std::filesystem::path& file, const std::string& camera, const std::string& unit) {
+  Scan scan = read_scan(file, {.camera_file = camera, .unit = length_unit_from_name(unit)});
+  for (const std::string& warning : scan.warnings) log(LogLevel::warning, file.filename().string() + ": " + warning);
+  return scan;
+}
+
+}  // namespace tribin::cli

@@ -1,0 +1,113 @@
+#include "tribin/report/json.hpp"
+
+#include "report/json_values.hpp"
+
+namespace tribin {
+namespace {
+
+using json::Json;
+
+Json evidence_json(const Evidence& e) {
+  Json out = {{"primitive", e.primitive}, {"type", name_of(e.type)}, {"cad_primitive", e.cad_primitive}};
+  if (e.scan_primitive > 0) out["scan_primitive"] = e.scan_primitive;
+  if (e.visible_arc > 0) out["visible_arc_deg"] = json::degrees(e.visible_arc);
+  out["inliers"] = e.inliers;
+  out["rms_mm"] = json::rounded(e.rms_mm, 5);
+  if (e.radius_nominal_mm) {
+    Json radius = {{"nominal", json::millimetres(*e.radius_nominal_mm)}};
+    if (e.radius_measured_mm) radius["measured"] = json::millimetres(*e.radius_measured_mm);
+    if (e.radius_sigma_mm) radius["sigma"] = json::significant(*e.radius_sigma_mm);
+    out["radius_mm"] = radius;
+  }
+  if (e.offset_mm) {
+    out["offset_mm"] = {{"measured", json::millimetres(*e.offset_mm)}};
+    if (e.offset_sigma_mm) out["offset_mm"]["sigma"] = json::significant(*e.offset_sigma_mm);
+  }
+  return out;
+}
+
+Json direction_json(const Vector6& direction) {
+  Json out = Json::array();
+  for (int i = 0; i < 6; ++i) out.push_back(json::rounded(direction[i], 9));
+  return out;
+}
+
+Json instance_json(const Instance& instance, const Pose& input_from_camera) {
+  const Matrix3 turn = input_from_camera.linear();
+  Json out = {{"id", instance.id},
+              {"part", instance.part},
+              {"score", json::rounded(instance.score, 4)},
+              {"visible_fraction", json::rounded(instance.visible_fraction, 4)}};
+  if (instance.p_within_tolerance) out["p_within_tolerance"] = json::rounded(*instance.p_within_tolerance, 4);
+  out["camera_from_part"] = json::pose(input_from_camera * instance.camera_from_part);
+  out["covariance"] = json::matrix6(json::turned(instance.covariance, turn));
+  out["free_directions"] = Json::array();
+  for (const Vector6& direction : instance.free_directions)
+    out["free_directions"].push_back(direction_json(json::turned(direction, turn)));
+  out["weak_directions"] = Json::array();
+  for (const WeakDirection& weak : instance.weak_directions)
+    out["weak_directions"].push_back({{"direction", direction_json(json::turned(weak.direction, turn))},
+                                      {"sigma_mm", json::significant(weak.sigma_mm)},
+                                      {"sigma_deg", json::significant(weak.sigma / kDegree)},
+                                      {"cure", weak.cure}});
+  out["equivalent_poses"] = Json::array();
+  for (const Pose& pose : instance.equivalent_poses)
+    out["equivalent_poses"].push_back(json::pose(input_from_camera * pose));
+  out["alternatives"] = Json::array();
+  for (const Alternative& alternative : instance.alternatives) {
+    Json entry = json::pose(input_from_camera * alternative.camera_from_part);
+    entry["probability"] = json::rounded(alternative.probability, 4);
+    entry["decided_by"] = alternative.decided_by;
+    out["alternatives"].push_back(entry);
+  }
+  out["evidence"] = Json::array();
+  for (const Evidence& evidence : instance.evidence) out["evidence"].push_back(evidence_json(evidence));
+  return out;
+}
+
+Json reason_json(const Reason& reason) {
+  Json out = {{"part", reason.part},
+              {"stage", reason.stage},
+              {"test", reason.test},
+              {"value", json::significant(reason.value)},
+              {"limit", json::significant(reason.limit)},
+              {"count", reason.count}};
+  if (reason.nearest_instance > 0)
+    out["nearest"] = {{"instance", reason.nearest_instance}, {"distance_mm", json::rounded(reason.nearest_mm, 2)}};
+  return out;
+}
+
+}  // namespace
+
+std::string locate_json(const Scan& scan, const Found& found, const JsonOptions& options) {
+  Json out = json::head();
+  out["status"] = found.status;
+  out["scan"] = json::scan_summary(scan, &found.surfels);
+  out["instances"] = Json::array();
+  for (const Instance& instance : found.instances.items)
+    out["instances"].push_back(instance_json(instance, scan.input_from_camera));
+  out["rejected"] = Json::array();
+  for (const Reason& reason : found.instances.rejected) out["rejected"].push_back(reason_json(reason));
+  out["primitives"] = json::counts(found.primitives.items);
+  out["warnings"] = json::warnings(found.warnings, scan.warnings);
+  if (options.times) out["stages_ms"] = json::stages(found.times);
+  return json::text_of(out);
+}
+
+std::string segment_json(const Scan& scan, const Surfels& surfels, const Primitives& primitives, const PrimitiveModel& model,
+                         const StageTimes& times, const std::vector<Warning>& warnings, const JsonOptions& options) {
+  Json out = json::head();
+  out["scan"] = json::scan_summary(scan, &surfels);
+  out["primitives"] = Json::array();
+  for (const Primitive& primitive : primitives.items)
+    out["primitives"].push_back(
+        json::primitive(json::moved(primitive, scan.input_from_camera), &primitives.spaces));
+  out["relations"] = Json::array();
+  for (const Relation& relation : model.relations)
+    out["relations"].push_back(json::relation(relation, scan.input_from_camera));
+  out["warnings"] = json::warnings(warnings, scan.warnings);
+  if (options.times) out["stages_ms"] = json::stages(times);
+  return json::text_of(out);
+}
+
+}  // namespace tribin
