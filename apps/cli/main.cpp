@@ -9,7 +9,8 @@
 #include "tribin/core/error.hpp"
 #include "tribin/core/log.hpp"
 #include "tribin/core/parallel.hpp"
-#ifdef TRIBIN_HAS_CAD_EXCHANGE
+#include "tribin/io/cad_files.hpp"
+#ifdef TRIBIN_WITH_CAD_EXCHANGE
 #include "tribin/cad_exchange/read_step.hpp"
 #endif
 
@@ -29,6 +30,17 @@ void log_to_stderr(const Context& context) {
     if (level == tribin::LogLevel::warning && !context.quiet) std::cerr << "warning: " << message << "\n";
     if (level != tribin::LogLevel::warning && context.verbose) std::cerr << message << "\n";
   });
+}
+
+void register_optional_readers() {
+#ifdef TRIBIN_WITH_CAD_EXCHANGE
+  using Path = std::filesystem::path;
+  using Options = tribin::CadReadOptions;
+  for (const char* extension : {".step", ".stp"})
+    tribin::register_cad_reader(extension, [](const Path& p, const Options&) { return tribin::read_step(p.string()); });
+  for (const char* extension : {".iges", ".igs"})
+    tribin::register_cad_reader(extension, [](const Path& p, const Options&) { return tribin::read_iges(p.string()); });
+#endif
 }
 
 int fail(const CLI::App& app, const std::string& message, int code) {
@@ -64,9 +76,7 @@ int main(int argc, char** argv) {
   }
   log_to_stderr(context);
   tribin::set_thread_count(context.threads);
-#ifdef TRIBIN_HAS_CAD_EXCHANGE
-  tribin::register_step_reader();
-#endif
+  register_optional_readers();
   try {
     return context.run();
   } catch (const tribin::Error& e) {

@@ -1,4 +1,5 @@
 #include "report/html.hpp"
+#include "report/palette.hpp"
 #include "report/spaces.hpp"
 
 namespace tribin::report {
@@ -90,7 +91,7 @@ std::string style() {
 }
 
 const char* const kLogo =
-    R"(<svg class="logo" viewBox="0 0 30 30" role="img" aria-label="tribin"><circle cx="9" cy="9" r="5.5" stroke="var(--plane)"/><path d="M18 4h8v8h-8zM18 8h8M22 4v8" stroke="var(--cylinder)"/><path d="M8 20l7-4 7 4v5l-7 4-7-4zM8 20l7 4 7-4M15 24v5" stroke="var(--text)"/></svg>)";
+    R"svg(<svg class="logo" viewBox="0 0 30 30" role="img" aria-label="tribin"><circle cx="9" cy="9" r="5.5" stroke="var(--plane)"/><path d="M18 4h8v8h-8zM18 8h8M22 4v8" stroke="var(--cylinder)"/><path d="M8 20l7-4 7 4v5l-7 4-7-4zM8 20l7 4 7-4M15 24v5" stroke="var(--text)"/></svg>)svg";
 
 }  // namespace
 

@@ -1,0 +1,7 @@
+#include "commands.hpp"
+#include "tribin/core/error.hpp"
+namespace tribin::cli {
+void add_bench(CLI::App&, Context&) {}
+void add_simulate(CLI::App&, Context&) {}
+void add_convert(CLI::App&, Context&) {}
+}  // namespace tribin::cli
