@@ -3,5 +3,4 @@
 namespace tribin::cli {
 void add_bench(CLI::App&, Context&) {}
 void add_simulate(CLI::App&, Context&) {}
-void add_convert(CLI::App&, Context&) {}
 }  // namespace tribin::cli

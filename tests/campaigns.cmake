@@ -1,0 +1,12 @@
+# Long runs that print figures: tests/campaign/NAME.cpp -> campaign_NAME, built on demand by `./test --campaign NAME`.
+file(GLOB campaigns CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/campaign/*.cpp)
+foreach(source ${campaigns})
+  get_filename_component(name ${source} NAME_WE)
+  add_executable(campaign_${name} EXCLUDE_FROM_ALL ${source})
+  target_link_libraries(campaign_${name} PRIVATE tribin::tribin)
+  foreach(optional sim cad_exchange)
+    if(TARGET tribin_${optional})
+      target_link_libraries(campaign_${name} PRIVATE tribin_${optional})
+    endif()
+  endforeach()
+endforeach()

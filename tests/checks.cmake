@@ -1,0 +1,16 @@
+# Tests that are programs of their own: the layer list, the layout, the command line, the pages' code, a foreign consumer.
+find_program(TRIBIN_PYTHON NAMES python3 PATHS /usr/bin NO_DEFAULT_PATH)  # the one that Debian's python3-* belong to
+find_program(TRIBIN_CLANG_FORMAT NAMES clang-format clang-format-14)
+
+function(tribin_check name)
+  add_test(NAME ${name} COMMAND ${ARGN} WORKING_DIRECTORY ${PROJECT_SOURCE_DIR})
+  set_tests_properties(${name} PROPERTIES LABELS quick SKIP_RETURN_CODE 77)
+endfunction()
+
+if(TRIBIN_PYTHON)
+  tribin_check(check_layers ${TRIBIN_PYTHON} tools/check_layers)
+  tribin_check(cli ${TRIBIN_PYTHON} tests/cli/cli_test.py $<TARGET_FILE:tribin_cli> ${PROJECT_BINARY_DIR}/cli_test)
+  tribin_check(docs ${TRIBIN_PYTHON} tests/docs/code_blocks_test.py $<TARGET_FILE:tribin_cli> ${PROJECT_BINARY_DIR}/docs_test)
+endif()
+tribin_check(clang_format tools/check_format "${TRIBIN_CLANG_FORMAT}")
+tribin_check(consumer tests/consumer/run ${PROJECT_SOURCE_DIR} ${PROJECT_BINARY_DIR})

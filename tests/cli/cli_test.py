@@ -1,0 +1,168 @@
+#!/usr/bin/env python3
+"""The command line's contract: exit codes, messages, help, schemas, same bytes, nothing half written.
+
+usage: cli_test.py TRIBIN WORK_DIR
+"""
+import json
+import os
+import pathlib
+import shutil
+import signal
+import subprocess
+import sys
+import time
+import unittest
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+DATA = pathlib.Path(os.environ.get("TRIBIN_DATA", ROOT / "../shared/data"))
+SCENES = DATA / "scenes_dev"
+COMMANDS = ["locate", "segment", "normals", "part", "convert", "simulate", "bench"]
+TRIBIN, WORK = sys.argv[1], pathlib.Path(sys.argv[2])
+
+
+def run(*arguments, **options):
+    return subprocess.run([TRIBIN, *map(str, arguments)], capture_output=True, text=True, timeout=300, **options)
+
+
+def box_stl(path, size=(60, 40, 30)):
+    corner = [[size[k] if i >> k & 1 else 0 for k in range(3)] for i in range(8)]
+    faces = [(0, 2, 1), (1, 2, 3), (4, 5, 6), (5, 7, 6), (0, 1, 4), (1, 5, 4),
+             (2, 6, 3), (3, 6, 7), (0, 4, 2), (2, 4, 6), (1, 3, 5), (3, 7, 5)]
+    lines = ["solid box"]
+    for face in faces:
+        lines += ["facet normal 0 0 0", "outer loop"]
+        lines += ["vertex %g %g %g" % tuple(corner[i]) for i in face] + ["endloop", "endfacet"]
+    path.write_text("\n".join(lines + ["endsolid box", ""]))
+    return path
+
+
+def validated(test, schema, document):
+    path = WORK / (schema + ".json")
+    path.write_text(document)
+    checked = subprocess.run([sys.executable, ROOT / "tools/validate_json", ROOT / f"schema/{schema}.schema.json", path],
+                             capture_output=True, text=True)
+    if checked.returncode != 77:  # python3-jsonschema is there
+        test.assertEqual(checked.returncode, 0, checked.stdout + checked.stderr)
+    return json.loads(document)
+
+
+class Options(unittest.TestCase):
+    def test_each_command_has_help_with_an_example(self):
+        for command in COMMANDS:
+            out = run(command, "--help")
+            self.assertEqual(out.returncode, 0, command)
+            self.assertIn("Example:\n  tribin " + command, out.stdout)
+
+    def test_version(self):
+        out = run("--version")
+        self.assertEqual((out.returncode, out.stdout), (0, "tribin 0.1.0\n"))
+
+    def test_bad_options_are_one_sentence_and_exit_code_2(self):
+        box = box_stl(WORK / "box.stl")
+        other = WORK / "other"
+        other.mkdir(exist_ok=True)
+        box_stl(other / "box.stl")
+        for arguments, words in [
+            ([], "subcommand"),
+            (["locate"], "SCAN"),
+            (["locate", "scan.pcd"], "--part"),
+            (["locate", "scan.pcd", "--part", box, "--frobnicate"], "--frobnicate"),
+            (["locate", "scan.pcd", "--part", box, "--tolerance-mm", "-1"], "--tolerance-mm"),
+            (["locate", "scan.pcd", "--part", box, "--part", other / "box.stl"], "named 'box'"),
+            (["locate", "scan.pcd", "--part", box, "--method", "magic"], "--method"),
+            (["locate", "scan.pcd", "--part", box, "--cell-px", "3"], "--expert"),
+            (["part", box, "--unit", "furlong"], "furlong"),
+            (["part", box, "--json", WORK / "no/such/folder/x.json"], "does not exist"),
+        ]:
+            out = run(*arguments)
+            self.assertEqual(out.returncode, 2, arguments)
+            self.assertEqual(out.stderr.count("\n"), 1, out.stderr)
+            self.assertIn(words, out.stderr)
+            self.assertEqual(out.stdout, "")
+
+    def test_bad_files_are_one_sentence_and_exit_code_3(self):
+        text = WORK / "text.stl"
+        text.write_text("this is not a part\n")
+        for arguments in (["part", text], ["part", WORK / "missing.stl"], ["segment", WORK / "missing.pcd"]):
+            out = run(*arguments)
+            self.assertEqual(out.returncode, 3, out.stderr)
+            self.assertEqual(out.stderr.count("\n"), 1, out.stderr)
+            self.assertIn(pathlib.Path(arguments[1]).name, out.stderr)
+            self.assertEqual(out.stdout, "")
+
+
+class PartCommand(unittest.TestCase):
+    def test_a_box_has_six_planes_and_four_poses(self):
+        out = run("part", box_stl(WORK / "box.stl"), "--json", "-")
+        self.assertEqual(out.returncode, 0, out.stderr)
+        part = validated(self, "part", out.stdout)
+        self.assertEqual([p["type"] for p in part["primitives"]], ["plane"] * 6)
+        self.assertEqual(len(part["symmetry"]["symmetries_discrete"]), 3)
+
+    def test_the_report_is_one_page_without_network(self):
+        dir = WORK / "part_report"
+        shutil.rmtree(dir, ignore_errors=True)
+        out = run("part", box_stl(WORK / "box.stl"), "--report", dir, "--no-times")
+        self.assertEqual(out.returncode, 0, out.stderr)
+        page = (dir / "index.html").read_text()
+        for forbidden in ("http://", "https://", "<script", "@import", "url("):
+            self.assertNotIn(forbidden, page)
+        validated(self, "part", (dir / "report.json").read_text())
+        self.assertEqual(sorted(p.name for p in dir.iterdir()), ["index.html", "report.json"])
+
+
+@unittest.skipUnless(SCENES.exists(), "SKIPPED: no shared data")
+class LocateCommand(unittest.TestCase):
+    scene = SCENES / "test/000001"
+    arguments = ["locate", scene / "depth/000000.png", "--camera", scene / "scene_camera.json",
+                 "--part", SCENES / "cad/alternator_a.stl", "--part", SCENES / "cad/alternator_b.stl", "--no-times"]
+
+    def test_same_bytes_for_any_number_of_threads(self):
+        one, two = (run(*self.arguments, "--json", "-", "--threads", n) for n in (1, 2))
+        self.assertEqual((one.returncode, two.returncode), (0, 0), one.stderr)
+        self.assertEqual(one.stdout, two.stdout)
+        result = validated(self, "locate", one.stdout)
+        self.assertEqual([i["part"] for i in result["instances"]], ["alternator_a"])
+
+    def test_the_report_holds_ten_figures_a_found_part(self):
+        dir = WORK / "locate_report"
+        shutil.rmtree(dir, ignore_errors=True)
+        out = run(*self.arguments, "--report", dir, "--truth", self.scene / "scene_gt.json")
+        self.assertEqual(out.returncode, 0, out.stderr)
+        page = (dir / "index.html").read_text()
+        self.assertLess((dir / "index.html").stat().st_size, 3_000_000)
+        figures = page.count("<figure>")
+        self.assertEqual(figures, 10 + 2, "ten of the part that is there, the CAD's two of the other")
+        for forbidden in ("http://", "https://", "<script"):
+            self.assertNotIn(forbidden, page)
+        validated(self, "locate", (dir / "report.json").read_text())
+
+    def test_a_file_is_there_whole_or_not_at_all_after_an_interrupt(self):
+        target = WORK / "interrupted"
+        shutil.rmtree(target, ignore_errors=True)
+        target.mkdir()
+        process = subprocess.Popen([TRIBIN, *map(str, self.arguments), "--json", target / "result.json", "--report", target / "report"],
+                                   stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        time.sleep(0.15)
+        process.send_signal(signal.SIGINT)
+        code = process.wait(60)
+        left = sorted(p.name for p in target.iterdir())
+        self.assertIn(code, (0, 130))
+        self.assertTrue(set(left) <= {"result.json", "report"}, left)
+
+
+@unittest.skipUnless(SCENES.exists(), "SKIPPED: no shared data")
+class SegmentCommand(unittest.TestCase):
+    def test_json_and_labels(self):
+        scene = SCENES / "test/000001"
+        labels = WORK / "labels.png"
+        out = run("segment", scene / "depth/000000.png", "--camera", scene / "scene_camera.json", "--json", "-", "--labels", labels)
+        self.assertEqual(out.returncode, 0, out.stderr)
+        result = validated(self, "segment", out.stdout)
+        self.assertTrue(any(p["type"] == "cylinder" for p in result["primitives"]))
+        self.assertEqual(labels.read_bytes()[:8], b"\x89PNG\r\n\x1a\n")
+
+
+if __name__ == "__main__":
+    WORK.mkdir(parents=True, exist_ok=True)
+    unittest.main(argv=sys.argv[:1], verbosity=2)
