@@ -15,8 +15,8 @@ struct Options {
 int run(const Options& options, const Context&) {
   const LengthUnit unit = length_unit_from_name(options.unit);
   StagedOutput staged(options.out);
-  const Converted done =
-      convert(options.in, staged.path(), {.scan = {.camera_file = options.camera, .unit = unit}, .cad = {.unit = unit}});
+  const Converted done = convert(options.in, staged.path(),
+                                 {.scan = {.camera_file = options.camera, .unit = unit}, .cad = {.unit = unit}});
   staged.publish();
   for (const std::string& warning : done.warnings) log(LogLevel::warning, warning);
   std::printf("%s: %s of %zu points", options.out.c_str(), done.kind.c_str(), done.points);
@@ -34,7 +34,8 @@ void add_convert(CLI::App& app, Context& context) {
   command->add_option("IN", options->in, "Any readable scan or CAD file")->required();
   command->add_option("OUT", options->out, "The extension says the format; lengths are written in mm")->required();
   command->add_option("--camera", options->camera, "Camera file of a depth image")->type_name("FILE");
-  command->add_option("--unit", options->unit, "Unit of an input that names none: mm, cm, m, inch, auto")->type_name("U");
+  command->add_option("--unit", options->unit, "Unit of an input that names none: mm, cm, m, inch, auto")
+      ->type_name("U");
   command->callback([options, &context] { context.run = [options, &context] { return run(*options, context); }; });
 }
 

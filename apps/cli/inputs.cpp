@@ -21,11 +21,11 @@ CLI::App* add_command(CLI::App& app, Context& context, const std::string& name, 
 }
 
 void only_experts(CLI::Option* option, Context& context) {
-  option->group("");  // not in --help
-  const std::string name = option->get_name();
+  const std::string name = option->get_name();  // before it leaves the help's groups: then it has no name to show
+  option->group("");
   option->check(CLI::Validator(
       [&context, name](std::string&) {
-        return context.expert ? std::string() : "stands behind --expert; give --expert first";
+        return context.expert ? std::string() : name + " stands behind --expert; give --expert first";
       },
       ""));
 }
@@ -42,8 +42,8 @@ std::vector<PartArgument> part_arguments(const std::vector<std::string>& argumen
     }
     if (part.name.empty()) part.name = part.file.stem().string();
     if (!names.insert(part.name).second)
-      throw Error(ErrorCode::bad_option,
-                  "--part " + argument + ": two parts are named '" + part.name + "'; give one another name by --part NAME=CAD");
+      throw Error(ErrorCode::bad_option, "--part " + argument + ": two parts are named '" + part.name +
+                                             "'; give one another name by --part NAME=CAD");
     out.push_back(part);
   }
   return out;

@@ -27,7 +27,8 @@ struct Options {
 /// The image's number in its data set: the file name's digits, as BOP has it.
 int image_of(const std::filesystem::path& scan) {
   const std::string stem = scan.stem().string();
-  const bool digits = !stem.empty() && std::all_of(stem.begin(), stem.end(), [](unsigned char c) { return std::isdigit(c); });
+  const bool digits =
+      !stem.empty() && std::all_of(stem.begin(), stem.end(), [](unsigned char c) { return std::isdigit(c); });
   return digits && stem.size() < 10 ? std::stoi(stem) : 0;
 }
 
@@ -39,11 +40,12 @@ ReportTruth read_truth(const Options& options) {
 }
 
 /// The result for people: one line a part. Poses are in the input's frame, as in the JSON.
-void print_table(const Scan& scan, std::span<const Part> parts, const Found& found, const std::optional<ReportTruth>& truth) {
+void print_table(const Scan& scan, std::span<const Part> parts, const Found& found,
+                 const std::optional<ReportTruth>& truth) {
   std::printf("%s.\n", verdict(found, parts).c_str());
   if (!found.instances.items.empty())
-    std::printf("%-20s %5s %7s %10s %10s %10s %9s %9s %9s %8s %8s%s\n", "part", "score", "visible", "x mm", "y mm", "z mm",
-                "Rx deg", "Ry deg", "Rz deg", "sd mm", "sd deg", truth ? " error mm  error deg" : "");
+    std::printf("%-20s %5s %7s %10s %10s %10s %9s %9s %9s %8s %8s%s\n", "part", "score", "visible", "x mm", "y mm",
+                "z mm", "Rx deg", "Ry deg", "Rz deg", "sd mm", "sd deg", truth ? " error mm  error deg" : "");
   std::optional<eval::Judgement> judged;
   if (truth) judged = eval::judge(found.instances.items, truth->truths, truth->models);
   for (std::size_t i = 0; i < found.instances.items.size(); ++i) {
@@ -69,7 +71,8 @@ void print_table(const Scan& scan, std::span<const Part> parts, const Found& fou
                   other.decided_by.c_str());
   }
   if (judged && judged->found.size() < truth->truths.size())
-    std::printf("%zu of %zu parts that are really there were not found.\n", judged->missed.size(), truth->truths.size());
+    std::printf("%zu of %zu parts that are really there were not found.\n", judged->missed.size(),
+                truth->truths.size());
 }
 
 void print_times(const StageTimes& times) {
@@ -125,8 +128,9 @@ int run(Options options, const Context& context) {
 
 void add_locate(CLI::App& app, Context& context) {
   auto options = std::make_shared<Options>();
-  CLI::App* command = add_command(app, context, "locate", "Find CAD parts in a scan: class and 6-DOF pose of each",
-                                  "tribin locate bin.pcd --part pulley.step --part shaft=8812-b.stl --json - --report out");
+  CLI::App* command =
+      add_command(app, context, "locate", "Find CAD parts in a scan: class and 6-DOF pose of each",
+                  "tribin locate bin.pcd --part pulley.step --part shaft=8812-b.stl --json - --report out");
   command->add_option("SCAN", options->scan, "Scan: PCD, PLY, depth PNG or TIFF with camera.json, NPY")->required();
   command->add_option("--part", options->parts, "CAD of a part to look for; repeat it for more")
       ->required()
@@ -147,8 +151,10 @@ void add_locate(CLI::App& app, Context& context) {
   command->add_option("--scan-unit", options->scan_unit, "Unit of clouds: mm, m, auto")->type_name("U");
   command->add_option("--method", options->method, "surfel")->type_name("M");
   command->add_option("--json", options->json, "Write the result as JSON; - is stdout")->type_name("OUT|-");
-  command->add_option("--report", options->report, "Write a page with pictures, evidence and reasons")->type_name("DIR");
-  command->add_option("--truth", options->truth, "scene_gt.json of a simulated scan: adds the errors")->type_name("FILE");
+  command->add_option("--report", options->report, "Write a page with pictures, evidence and reasons")
+      ->type_name("DIR");
+  command->add_option("--truth", options->truth, "scene_gt.json of a simulated scan: adds the errors")
+      ->type_name("FILE");
   command->add_flag("--no-times", options->no_times, "Leave the times out: same input, same bytes");
   only_experts(command->add_option("--cell-px", options->finder.surfel.cell_px), context);
   only_experts(command->add_option("--max-radius-mm", options->finder.surfel.max_radius_mm), context);

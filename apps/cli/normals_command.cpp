@@ -62,7 +62,8 @@ int run(const Options& options, const Context&) {
        << points.size();
   for (const char* name : {"x", "y", "z", "nx", "ny", "nz"}) file << "\nproperty float " << name;
   file << "\nend_header\n";
-  file.write(reinterpret_cast<const char*>(points.data()), static_cast<std::streamsize>(points.size() * sizeof(OrientedPoint)));
+  file.write(reinterpret_cast<const char*>(points.data()),
+             static_cast<std::streamsize>(points.size() * sizeof(OrientedPoint)));
   file.close();
   if (!file) throw Error(ErrorCode::bad_option, options.out + ": cannot be written (is the disk full?)");
   staged.publish();

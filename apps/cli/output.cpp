@@ -68,7 +68,8 @@ StagedOutput::StagedOutput(const fs::path& final_place) : final_(fs::absolute(fi
   std::error_code error;
   fs::create_directories(folder_, error);
   if (error)
-    throw Error(ErrorCode::bad_option, final_place.string() + ": cannot write into " + parent.string() + ": " + error.message());
+    throw Error(ErrorCode::bad_option,
+                final_place.string() + ": cannot write into " + parent.string() + ": " + error.message());
 }
 
 StagedOutput::~StagedOutput() {

@@ -18,8 +18,8 @@ struct Options {
 
 void print_table(const Part& part) {
   const Vec3 size = part.box_max - part.box_min;
-  std::printf("%s: %.1f x %.1f x %.1f mm, diameter %.2f mm, %zu triangles\n", part.name.c_str(), size.x(), size.y(), size.z(),
-              part.diameter_mm, part.mesh.triangles.size());
+  std::printf("%s: %.1f x %.1f x %.1f mm, diameter %.2f mm, %zu triangles\n", part.name.c_str(), size.x(), size.y(),
+              size.z(), part.diameter_mm, part.mesh.triangles.size());
   const std::size_t turns = part.symmetry.discrete.empty() ? 0 : part.symmetry.discrete.size() - 1;
   std::printf("symmetry: %s, %zu further pose%s that leave%s it as it is, %zu self-similar\n",
               part.symmetry.continuous.empty() ? "no axis of free turning" : "free turning about one axis", turns,
@@ -27,7 +27,8 @@ void print_table(const Part& part) {
   std::printf("%4s %-9s %10s %9s %9s %s\n", "id", "type", "area mm2", "radius mm", "height mm", "");
   for (const Primitive& p : part.model.primitives) {
     std::printf("%4d %-9s %10.1f", p.id, name_of(p.type), p.area_mm2);
-    if (p.type == PrimitiveType::cylinder) std::printf(" %9.3f %9.2f %s", p.radius_mm, p.height_mm(), p.concave ? "hole" : "");
+    if (p.type == PrimitiveType::cylinder)
+      std::printf(" %9.3f %9.2f %s", p.radius_mm, p.height_mm(), p.concave ? "hole" : "");
     if (p.type == PrimitiveType::sphere) std::printf(" %9.3f", p.radius_mm);
     std::printf("\n");
   }
@@ -51,7 +52,8 @@ int run(const Options& options, const Context& context) {
   if (!options.json.empty()) write_text(options.json, part_json(part, file, times, {.times = !options.no_times}));
   if (!options.report.empty()) {
     StagedOutput staged(options.report);
-    write_part_report(staged.path(), part, file, times, {context.command, {options.cad}, context.threads, !options.no_times});
+    write_part_report(staged.path(), part, file, times,
+                      {context.command, {options.cad}, context.threads, !options.no_times});
     staged.publish();
   }
   if (options.json != "-") print_table(part);
@@ -62,8 +64,9 @@ int run(const Options& options, const Context& context) {
 
 void add_part(CLI::App& app, Context& context) {
   auto options = std::make_shared<Options>();
-  CLI::App* command = add_command(app, context, "part", "What a CAD file gives: primitives, symmetry, how findable it is",
-                                  "tribin part pulley.stl --unit mm --json - --report out");
+  CLI::App* command =
+      add_command(app, context, "part", "What a CAD file gives: primitives, symmetry, how findable it is",
+                  "tribin part pulley.stl --unit mm --json - --report out");
   command->add_option("CAD", options->cad, "CAD: STEP, IGES, DXF, STL, OBJ, PLY")->required();
   command->add_option("--unit", options->unit, "Unit of files that name none: mm, cm, m, inch")->type_name("U");
   command->add_option("--json", options->json, "Write the result as JSON; - is stdout")->type_name("OUT|-");

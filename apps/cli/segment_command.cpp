@@ -3,8 +3,8 @@
 #include "commands.hpp"
 #include "output.hpp"
 #include "tribin/core/error.hpp"
-#include "tribin/report/label_png.hpp"
 #include "tribin/report/json.hpp"
+#include "tribin/report/label_png.hpp"
 #include "tribin/report/report.hpp"
 
 namespace tribin::cli {

@@ -14,7 +14,8 @@ namespace {
 tribin::Mesh box() {
   tribin::Mesh mesh;
   mesh.name = "box";
-  for (int i = 0; i < 8; ++i) mesh.vertices.push_back({i & 1 ? 30.f : -30.f, i & 2 ? 20.f : -20.f, i & 4 ? 15.f : -15.f});
+  for (int i = 0; i < 8; ++i)
+    mesh.vertices.push_back({i & 1 ? 30.f : -30.f, i & 2 ? 20.f : -20.f, i & 4 ? 15.f : -15.f});
   mesh.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
                     {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
   return mesh;

@@ -14,7 +14,8 @@ using Json = nlohmann::json;
 
 Json read_json(const std::filesystem::path& path) {
   std::ifstream file(path);
-  if (!file) throw Error(ErrorCode::bad_input, path.string() + ": cannot be opened; wanted a JSON file of a BOP data set");
+  if (!file)
+    throw Error(ErrorCode::bad_input, path.string() + ": cannot be opened; wanted a JSON file of a BOP data set");
   try {
     return Json::parse(file);
   } catch (const Json::exception& e) {
@@ -94,8 +95,7 @@ std::vector<Truth> read_bop_truth(const std::filesystem::path& scene_gt, int ima
   const std::string key = std::to_string(image);
   std::vector<Truth> out;
   try {
-    if (!truths.contains(key))
-      throw Error(ErrorCode::bad_input, scene_gt.string() + ": has no image " + key);
+    if (!truths.contains(key)) throw Error(ErrorCode::bad_input, scene_gt.string() + ": has no image " + key);
     for (std::size_t i = 0; i < truths[key].size(); ++i) {
       const Json& entry = truths[key][i];
       const int id = entry.at("obj_id");

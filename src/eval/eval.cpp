@@ -8,8 +8,8 @@
 namespace tribin::eval {
 namespace {
 
-/// The part_from_part motions to try so that truth * S comes close to the answer: every discrete one, each with the turn
-/// about the continuous axis that leaves the least rotation.
+/// The part_from_part motions to try so that truth * S comes close to the answer: every discrete one, each with the
+/// turn about the continuous axis that leaves the least rotation.
 std::vector<Pose> symmetries_near(const Model& model, const Pose& answer, const Pose& truth) {
   std::vector<Pose> discrete = model.symmetry.discrete;
   if (discrete.empty()) discrete.push_back(Pose::Identity());

@@ -13,17 +13,17 @@ namespace tribin::report {
 /// Triangles to draw: shared vertices with normals (towards the viewer or not: shading turns them), one material each.
 struct Surface {
   std::vector<Vec3f> vertices;
-  std::vector<Vec3f> normals;                           ///< of the vertices; empty = flat triangles
+  std::vector<Vec3f> normals;  ///< of the vertices; empty = flat triangles
   std::vector<std::array<std::uint32_t, 3>> triangles;
-  std::vector<Material> materials;                      ///< of the triangles
-  std::vector<std::uint8_t> steps;                      ///< of the triangles, for Material::height; may be empty
-  std::vector<float> tints;                             ///< of the triangles: added to the shade; may be empty
+  std::vector<Material> materials;  ///< of the triangles
+  std::vector<std::uint8_t> steps;  ///< of the triangles, for Material::height; may be empty
+  std::vector<float> tints;         ///< of the triangles: added to the shade; may be empty
 };
 
 /// Parallel projection: x right, y down, z away from the viewer.
 struct View {
   Matrix3 view_from_world = Matrix3::Identity();
-  Vec3 center = Vec3::Zero();   ///< world point in the middle of the picture
+  Vec3 center = Vec3::Zero();  ///< world point in the middle of the picture
   double px_per_mm = 1;
   int width = 0;
   int height = 0;
@@ -43,8 +43,7 @@ struct Canvas {
   Image<std::uint8_t> indices;
   Image<float> depth;
 
-  explicit Canvas(const View& v)
-      : view(v), indices(v.width, v.height, 0), depth(v.width, v.height, 1e30f) {}
+  explicit Canvas(const View& v) : view(v), indices(v.width, v.height, 0), depth(v.width, v.height, 1e30f) {}
   void draw(const Surface& surface);
   /// A line in space, `width_px` wide, where it is nearer than the depth buffer + slack_mm; it leaves the buffer alone.
   void line(const Vec3& a, const Vec3& b, Material material, double width_px, double slack_mm);

@@ -40,8 +40,9 @@ struct TocEntry {
 };
 /// The page around a body: tokens, style, head line, contents.
 /// \param state  ok | warn | bad, of the chip; chip = its words.
-std::string page(const std::string& title, const std::string& verdict, const std::string& lead, const std::string& state,
-                 const std::string& chip, const std::vector<TocEntry>& contents, const std::string& body);
+std::string page(const std::string& title, const std::string& verdict, const std::string& lead,
+                 const std::string& state, const std::string& chip, const std::vector<TocEntry>& contents,
+                 const std::string& body);
 
 /// SHA-256 of a file, as hex.
 /// \throws Error bad_input when it cannot be read.

@@ -94,14 +94,14 @@ std::string locate_json(const Scan& scan, const Found& found, const JsonOptions&
   return json::text_of(out);
 }
 
-std::string segment_json(const Scan& scan, const Surfels& surfels, const Primitives& primitives, const PrimitiveModel& model,
-                         const StageTimes& times, const std::vector<Warning>& warnings, const JsonOptions& options) {
+std::string segment_json(const Scan& scan, const Surfels& surfels, const Primitives& primitives,
+                         const PrimitiveModel& model, const StageTimes& times, const std::vector<Warning>& warnings,
+                         const JsonOptions& options) {
   Json out = json::head();
   out["scan"] = json::scan_summary(scan, &surfels);
   out["primitives"] = Json::array();
   for (const Primitive& primitive : primitives.items)
-    out["primitives"].push_back(
-        json::primitive(json::moved(primitive, scan.input_from_camera), &primitives.spaces));
+    out["primitives"].push_back(json::primitive(json::moved(primitive, scan.input_from_camera), &primitives.spaces));
   out["relations"] = Json::array();
   for (const Relation& relation : model.relations)
     out["relations"].push_back(json::relation(relation, scan.input_from_camera));

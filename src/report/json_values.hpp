@@ -12,7 +12,7 @@ using Json = nlohmann::ordered_json;
 Json rounded(double value, int decimals);
 /// A number with six significant digits: for variances, which have no natural step.
 Json significant(double value);
-Json millimetres(double value);         ///< 10 nm steps
+Json millimetres(double value);  ///< 10 nm steps
 Json millimetres(const Vec3& value);
 Json unit_vector(const Vec3& value);
 Json degrees(double radians);

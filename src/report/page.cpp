@@ -95,19 +95,23 @@ const char* const kLogo =
 
 }  // namespace
 
-std::string page(const std::string& title, const std::string& verdict, const std::string& lead, const std::string& state,
-                 const std::string& chip, const std::vector<TocEntry>& contents, const std::string& body) {
+std::string page(const std::string& title, const std::string& verdict, const std::string& lead,
+                 const std::string& state, const std::string& chip, const std::vector<TocEntry>& contents,
+                 const std::string& body) {
   std::string out =
       "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" "
-      "content=\"width=device-width,initial-scale=1\"><meta name=\"generator\" content=\"tribin " TRIBIN_VERSION "\"><title>" +
-      escaped(title) + "</title><style>" + style() + "</style></head>\n<body><main class=\"doc\">\n<header>" + kLogo + "<h1>" +
-      escaped(verdict) + "</h1><span class=\"chip " + state + "\">" + state_icon(state) + escaped(chip) + "</span>";
+      "content=\"width=device-width,initial-scale=1\"><meta name=\"generator\" content=\"tribin " TRIBIN_VERSION
+      "\"><title>" +
+      escaped(title) + "</title><style>" + style() + "</style></head>\n<body><main class=\"doc\">\n<header>" + kLogo +
+      "<h1>" + escaped(verdict) + "</h1><span class=\"chip " + state + "\">" + state_icon(state) + escaped(chip) +
+      "</span>";
   if (!lead.empty()) out += "<p>" + lead + "</p>";
   out += "</header>\n<nav aria-label=\"Contents\">";
   for (const TocEntry& entry : contents) out += "<a href=\"#" + entry.id + "\">" + escaped(entry.title) + "</a>";
   out += "</nav>\n" + body;
-  out += "<div class=\"foot\">This page holds everything it shows and loads nothing from the network. Written by tribin " TRIBIN_VERSION
-         ".</div>\n</main></body></html>\n";
+  out +=
+      "<div class=\"foot\">This page holds everything it shows and loads nothing from the network. Written by "
+      "tribin " TRIBIN_VERSION ".</div>\n</main></body></html>\n";
   return out;
 }
 

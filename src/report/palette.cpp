@@ -19,10 +19,12 @@ struct Tokens {
   std::uint32_t plane, cylinder, cone, sphere, none, grey, faint, line, halo;
   std::uint32_t classes[6];
 };
-constexpr Tokens kLight{0x1B55B3, 0xD0640A, 0x0A9686, 0x8A1A55, 0x7A828E, 0x9AA1AC, 0xC3C8D0, 0x3A414C, 0xFFFFFF,
-                        {0x282B86, 0xA06A00, 0x1D8475, 0x944AAD, 0x495D00, 0x661E1F}};
-constexpr Tokens kDark{0x4A93F5, 0xF7A03C, 0x5CE6D3, 0xD04A8C, 0x8A929E, 0x7F8793, 0x454C58, 0xD5DAE2, 0x171A20,
-                       {0xB8C0F8, 0xE5A111, 0x4BAB94, 0xA870BE, 0xD1F29F, 0xCF661E}};
+constexpr Tokens kLight{
+    0x1B55B3, 0xD0640A, 0x0A9686, 0x8A1A55, 0x7A828E,
+    0x9AA1AC, 0xC3C8D0, 0x3A414C, 0xFFFFFF, {0x282B86, 0xA06A00, 0x1D8475, 0x944AAD, 0x495D00, 0x661E1F}};
+constexpr Tokens kDark{
+    0x4A93F5, 0xF7A03C, 0x5CE6D3, 0xD04A8C, 0x8A929E,
+    0x7F8793, 0x454C58, 0xD5DAE2, 0x171A20, {0xB8C0F8, 0xE5A111, 0x4BAB94, 0xA870BE, 0xD1F29F, 0xCF661E}};
 
 Rgb mixed(const Rgb& a, const Rgb& b, double t) {
   Rgb out;
@@ -55,8 +57,9 @@ std::uint8_t index_of(Material material, double shade, int step) {
 std::vector<Rgb> palette(bool dark, int part_class) {
   static_assert(1 + (static_cast<int>(Material::height) + kHeights) * kShades <= 256);
   const Tokens& t = dark ? kDark : kLight;
-  const std::uint32_t colours[] = {t.plane, t.cylinder, t.cone, t.sphere, t.none,
-                                   t.grey,  t.faint,    t.line, t.classes[std::max(0, part_class) % 6], t.halo};
+  const std::uint32_t colours[] = {
+      t.plane, t.cylinder, t.cone, t.sphere, t.none, t.grey, t.faint, t.line, t.classes[std::max(0, part_class) % 6],
+      t.halo};
   std::vector<Rgb> out(1, rgb(t.halo));
   for (std::size_t m = 0; m < std::size(colours); ++m) {
     const bool is_line = m >= static_cast<std::size_t>(Material::line);  // lines have no shadow side

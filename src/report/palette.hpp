@@ -11,7 +11,7 @@ namespace tribin::report {
 enum class Material : std::uint8_t { plane, cylinder, cone, sphere, none, grey, faint, line, class_line, halo, height };
 
 inline constexpr int kShades = 10;
-inline constexpr int kHeights = 15;   ///< steps of the height colours, each with kShades: all fit 256 entries
+inline constexpr int kHeights = 15;  ///< steps of the height colours, each with kShades: all fit 256 entries
 
 Material material_of(PrimitiveType type);
 

@@ -20,7 +20,8 @@ Json matrix4(const Pose& pose) {
 Json symmetry_json(const SymmetryGroup& symmetry) {
   Json out = {{"symmetries_continuous", Json::array()}, {"symmetries_discrete", Json::array()}};
   for (const ContinuousSymmetry& s : symmetry.continuous)
-    out["symmetries_continuous"].push_back({{"axis", json::unit_vector(s.axis)}, {"offset", json::millimetres(s.point)}});
+    out["symmetries_continuous"].push_back(
+        {{"axis", json::unit_vector(s.axis)}, {"offset", json::millimetres(s.point)}});
   for (std::size_t i = 1; i < symmetry.discrete.size(); ++i)  // BOP leaves the identity out
     out["symmetries_discrete"].push_back(matrix4(symmetry.discrete[i]));
   return out;
@@ -31,8 +32,8 @@ Json symmetry_json(const SymmetryGroup& symmetry) {
 constexpr double kNoiseMm = 0.1, kPixelMm = 0.5;
 
 struct ViewStrength {
-  double sigma_mm = 0;                  ///< along the weakest direction; turns count at the rim, half a diameter out
-  Vector6 weakest = Vector6::Zero();    ///< (mm, mm at the rim), part frame, about the box's centre
+  double sigma_mm = 0;                ///< along the weakest direction; turns count at the rim, half a diameter out
+  Vector6 weakest = Vector6::Zero();  ///< (mm, mm at the rim), part frame, about the box's centre
 };
 
 /// How well the surface seen from one direction holds the pose, point to plane; depth edges, which add to it, are not
@@ -102,7 +103,8 @@ std::string part_json(const Part& part, const std::string& file, const StageTime
     out["primitives"].push_back(entry);
   }
   out["relations"] = Json::array();
-  for (const Relation& relation : part.model.relations) out["relations"].push_back(json::relation(relation, Pose::Identity()));
+  for (const Relation& relation : part.model.relations)
+    out["relations"].push_back(json::relation(relation, Pose::Identity()));
   out["symmetry"] = symmetry_json(part.symmetry);
   out["self_similar"] = Json::array();
   for (const SelfSimilarPose& pose : part.self_similar) {

@@ -21,11 +21,12 @@ std::string painted(const Canvas& canvas, int part_class, const std::string& alt
   return picture(canvas.indices, palette(false, part_class), palette(true, part_class), alt);
 }
 
-/// Looks at a box from the camera's side, 38 degrees lower and 18 degrees from the left, so that steps and heights show.
+/// Looks at a box from the camera's side, 24 degrees lower and 14 degrees from the left, so that steps and heights
+/// show.
 View view_of_box(const Vec3& low, const Vec3& high, const Pose& camera_from_part, int size_px, double margin) {
   const Vec3 center = camera_from_part * Vec3(0.5 * (low + high));
   const Vec3 ray = center.norm() > 1 ? Vec3(center.normalized()) : Vec3(Vec3::UnitZ());
-  const Matrix3 turn = rotation_from_vector(Vec3(0, -18 * kDegree, 0)) * rotation_from_vector(Vec3(38 * kDegree, 0, 0));
+  const Matrix3 turn = rotation_from_vector(Vec3(0, -14 * kDegree, 0)) * rotation_from_vector(Vec3(24 * kDegree, 0, 0));
   View view = view_along(turn * ray, Vec3::UnitY(), center, 1, size_px, size_px);
   double reach = 0;
   for (int corner = 0; corner < 8; ++corner) {
@@ -102,8 +103,9 @@ std::string space_pictures(const Observation& seen, const Sighting& where, const
   std::string out;
   out += figure("a", "IJK space: every normal of " + of_what + " as a point on the half sphere",
                 sphere_svg(all, {}, {}, "Half sphere of all normals"));
-  out += figure("b", "Dense spots of the flat surfels: candidates for planes",
-                sphere_svg(flat, marks(seen.primitives, where, PrimitiveType::plane, 5), {}, "Half sphere of flat surfels"));
+  out += figure(
+      "b", "Dense spots of the flat surfels: candidates for planes",
+      sphere_svg(flat, marks(seen.primitives, where, PrimitiveType::plane, 5), {}, "Half sphere of flat surfels"));
   out += figure("c", "The curved surfels: a cylinder is a great circle, a cone a small one",
                 sphere_svg(curved, {}, circles(seen.primitives, where, 3), "Half sphere of curved surfels"));
   out += figure("d", "Parameter space of the whole scan: votes for the axis (θ outwards, φ around), d = 0, log scale",
@@ -138,7 +140,8 @@ Height height_over(const Observation& seen, const Surface& surface) {
 void paint_heights(Surface& surface, const Height& height) {
   for (std::size_t t = 0; t < surface.triangles.size(); ++t) {
     surface.materials[t] = Material::height;
-    surface.steps[t] = static_cast<std::uint8_t>(height.step_of(surface.vertices[surface.triangles[t][0]].cast<double>()));
+    surface.steps[t] =
+        static_cast<std::uint8_t>(height.step_of(surface.vertices[surface.triangles[t][0]].cast<double>()));
   }
 }
 
@@ -163,7 +166,8 @@ std::string scan_solids(const Observation& seen, const Sighting& where, const Vi
     canvas.draw(surface_of(seen.scan, seen.surfels, where, stride, [&](int u, int v) {
       return on_part(where, u, v) ? look_of_type(labels.at(u, v)) : out_of_sight;
     }));
-    out += figure("f", "Segmentation by type; grey is unexplained", painted(canvas, part_class, "Segmentation by type"));
+    out +=
+        figure("f", "Segmentation by type; grey is unexplained", painted(canvas, part_class, "Segmentation by type"));
   }
   {
     Canvas canvas(view);
@@ -193,12 +197,14 @@ std::string cad_solids(const Part& part, const Pose& pose, const View& view, int
   model.draw(coloured);
   return figure("h", "CAD as read: " + grouped(static_cast<long long>(part.mesh.triangles.size())) + " triangles",
                 painted(cad, part_class, "The CAD part")) +
-         figure("i", "Model made from the CAD, by the same segmentation", painted(model, part_class, "Primitives of the CAD part"));
+         figure("i", "Model made from the CAD, by the same segmentation",
+                painted(model, part_class, "Primitives of the CAD part"));
 }
 
 }  // namespace
 
-std::string ten_pictures(const Observation& seen, const Part& part, const Instance* instance, int part_class, int size_px) {
+std::string ten_pictures(const Observation& seen, const Part& part, const Instance* instance, int part_class,
+                         int size_px) {
   if (!instance) return part_pictures(part, size_px);
   const Pose& pose = instance->camera_from_part;
   const Sighting where = sighting_of(seen.scan, seen.surfels, seen.primitives, part, pose);
@@ -245,7 +251,9 @@ std::string picture_legend() {
   std::string out = "<div class=\"leg\">";
   for (PrimitiveType type : {PrimitiveType::plane, PrimitiveType::cylinder, PrimitiveType::cone, PrimitiveType::sphere})
     out += "<span>" + type_icon(type) + name_of(type) + "</span>";
-  out += "<span>low <i class=\"ramp viridis\"></i> high (viridis)</span><span>few <i class=\"ramp magma\"></i> many (magma)</span>";
+  out +=
+      "<span>low <i class=\"ramp viridis\"></i> high (viridis)</span><span>few <i class=\"ramp magma\"></i> many "
+      "(magma)</span>";
   return out + "</div>\n";
 }
 
@@ -259,13 +267,16 @@ std::string overview(const Observation& seen, std::span<const Part> parts, const
   const double z = eval::quantile(depths, 0.5);
   const double px_per_mm = kWidth * scan.camera.fx / (z * scan.width());
   const int height = std::min(900, static_cast<int>(px_per_mm * z * scan.height() / scan.camera.fy));
-  View view = view_along(Vec3::UnitZ(), Vec3::UnitY(), scan.camera.point(0.5 * scan.width(), 0.5 * scan.height(), z), kWidth / px_per_mm,
-                         kWidth, height);
+  View view = view_along(Vec3::UnitZ(), Vec3::UnitY(), scan.camera.point(0.5 * scan.width(), 0.5 * scan.height(), z),
+                         kWidth / px_per_mm, kWidth, height);
   Canvas canvas(view);
   const Sighting all = whole_scan(scan, seen.surfels, seen.primitives);
-  canvas.draw(surface_of(scan, seen.surfels, all, std::max(1, scan.width() / 640), [](int, int) { return PixelLook{}; }));
+  canvas.draw(
+      surface_of(scan, seen.surfels, all, std::max(1, scan.width() / 640), [](int, int) { return PixelLook{}; }));
   const auto class_of = [&](const Instance& instance) {
-    return static_cast<int>(std::find_if(parts.begin(), parts.end(), [&](const Part& p) { return p.name == instance.part; }) - parts.begin());
+    return static_cast<int>(
+        std::find_if(parts.begin(), parts.end(), [&](const Part& p) { return p.name == instance.part; }) -
+        parts.begin());
   };
   for (const Instance& instance : instances) {
     const int k = class_of(instance);
@@ -274,13 +285,15 @@ std::string overview(const Observation& seen, std::span<const Part> parts, const
     hidden.draw(surface_of(parts[k].mesh, instance.camera_from_part, Material::grey));
     std::swap(hidden.depth, canvas.depth);
     Image<std::uint8_t> before = canvas.indices;
-    draw_edges(canvas, parts[k].mesh, edges_of(parts[k].mesh), instance.camera_from_part, Material::class_line, 2.4, 1.2);
+    draw_edges(canvas, parts[k].mesh, edges_of(parts[k].mesh), instance.camera_from_part, Material::class_line, 2.4,
+               1.2);
     const std::uint8_t drawn = index_of(Material::class_line, 0.5), wanted = index_of(Material::height, 0.75, k % 6);
     for (std::size_t i = 0; i < before.size(); ++i)
       if (canvas.indices.data[i] == drawn && before.data[i] != drawn) canvas.indices.data[i] = wanted;
     std::swap(hidden.depth, canvas.depth);
   }
-  return "<figure class=\"wide\"><div class=\"art\">" + painted(canvas, -1, "The scan with the outline of every part found") +
+  return "<figure class=\"wide\"><div class=\"art\">" +
+         painted(canvas, -1, "The scan with the outline of every part found") +
          "</div><figcaption>The scan from the camera's eye, with the CAD outline of every part found in its class's "
          "colour. Empty places were not measured.</figcaption></figure>\n";
 }

@@ -20,7 +20,8 @@ std::string overview(const Observation& seen, std::span<const Part> parts, const
 /// The ten pictures of the paper's figures 4 and 5, as figures of the page, for one part.
 /// \param instance  null when the part was not found: then only the CAD's two can be shown.
 /// \param size_px   of the square pictures.
-std::string ten_pictures(const Observation& seen, const Part& part, const Instance* instance, int part_class, int size_px);
+std::string ten_pictures(const Observation& seen, const Part& part, const Instance* instance, int part_class,
+                         int size_px);
 
 /// The seven pictures that need no part: spaces, cloud, segmentation, model.
 std::string scan_pictures(const Observation& seen, int size_px);

@@ -44,9 +44,15 @@ std::string lead_of(const Scan& scan, const Found& found, std::span<const Part> 
     open += !instance.weak_directions.empty() || !instance.free_directions.empty();
     undecided += !instance.alternatives.empty();
   }
-  if (!items.empty() && open + undecided == 0) out += items.size() == 1 ? " Its pose is fixed in all six directions." : " All poses are fixed in all six directions.";
-  if (open > 0) out += " " + std::to_string(open) + " of " + std::to_string(items.size()) + " poses leave a direction free or weak.";
-  if (undecided > 0) out += " " + std::to_string(undecided) + " of " + std::to_string(items.size()) + " have another pose that the data does not rule out.";
+  if (!items.empty() && open + undecided == 0)
+    out +=
+        items.size() == 1 ? " Its pose is fixed in all six directions." : " All poses are fixed in all six directions.";
+  if (open > 0)
+    out +=
+        " " + std::to_string(open) + " of " + std::to_string(items.size()) + " poses leave a direction free or weak.";
+  if (undecided > 0)
+    out += " " + std::to_string(undecided) + " of " + std::to_string(items.size()) +
+           " have another pose that the data does not rule out.";
   return out;
 }
 
@@ -61,18 +67,22 @@ const Instance* best_of(const Found& found, const std::string& part) {
 void write_locate_report(const std::filesystem::path& dir, const Scan& scan, std::span<const Part> parts,
                          const Found& found, const ReportContext& context, const std::optional<ReportTruth>& truth) {
   const report::Observation seen{scan, found.surfels, found.primitives};
-  std::string pictures = report::section("pictures", "Ten pictures a part",
-                                         "The same ten as figures 4 and 5 of the paper, from this scan; each part where it was found best.");
+  std::string pictures = report::section(
+      "pictures", "Ten pictures a part",
+      "The same ten as figures 4 and 5 of the paper, from this scan; each part where it was found best.");
   for (std::size_t i = 0; i < parts.size() && i < kPicturedParts; ++i) {
     const Instance* instance = best_of(found, parts[i].name);
-    pictures += "<h3>" + report::class_tag(static_cast<int>(i)) + report::escaped(parts[i].name) +
-                (instance ? "" : " <span class=\"muted\">not found: its CAD alone</span>") + "</h3><div class=\"pics\">" +
-                report::ten_pictures(seen, parts[i], instance, static_cast<int>(i), picture_size(parts.size())) + "</div>";
+    pictures +=
+        "<h3>" + report::class_tag(static_cast<int>(i)) + report::escaped(parts[i].name) +
+        (instance ? "" : " <span class=\"muted\">not found: its CAD alone</span>") + "</h3><div class=\"pics\">" +
+        report::ten_pictures(seen, parts[i], instance, static_cast<int>(i), picture_size(parts.size())) + "</div>";
   }
   pictures += report::picture_legend() + "</section>\n";
 
-  std::vector<TocEntry> contents = {{"poses", "Poses"}, {"pictures", "Ten pictures"}, {"evidence", "Evidence"}, {"why", "Why not?"}};
-  std::string body = report::warning_lines(found.warnings, scan.warnings) + report::poses_section(scan, parts, found, truth) +
+  std::vector<TocEntry> contents = {
+      {"poses", "Poses"}, {"pictures", "Ten pictures"}, {"evidence", "Evidence"}, {"why", "Why not?"}};
+  std::string body = report::warning_lines(found.warnings, scan.warnings) +
+                     report::poses_section(scan, parts, found, truth) +
                      report::overview(seen, parts, found.instances.items) + pictures +
                      report::evidence_section(parts, found) + report::why_not_section(parts, found);
   if (context.times) {
@@ -85,7 +95,8 @@ void write_locate_report(const std::filesystem::path& dir, const Scan& scan, std
   std::string chip = "status " + found.status;
   if (context.times) chip += ", " + report::number(found.times.total(), 1) + " ms";
   const std::string sentence = verdict(found, parts);
-  write_page(dir, report::page("tribin: " + sentence, sentence, lead_of(scan, found, parts), state, chip, contents, body),
+  write_page(dir,
+             report::page("tribin: " + sentence, sentence, lead_of(scan, found, parts), state, chip, contents, body),
              locate_json(scan, found, {.times = context.times}));
 }
 
@@ -98,11 +109,13 @@ void write_segment_report(const std::filesystem::path& dir, const Scan& scan, co
   std::string sentence;
   for (int i = 0; i < 4; ++i)
     if (count[i] > 0 || i < 2)
-      sentence += (sentence.empty() ? "" : ", ") + std::to_string(count[i]) + " " + words[i] + (count[i] == 1 ? "" : "s");
+      sentence +=
+          (sentence.empty() ? "" : ", ") + std::to_string(count[i]) + " " + words[i] + (count[i] == 1 ? "" : "s");
   std::vector<TocEntry> contents = {{"pictures", "Pictures"}, {"primitives", "Primitives"}};
-  std::string body = report::warning_lines(warnings, scan.warnings) + report::section("pictures", "Seven pictures", "") +
-                     "<div class=\"pics\">" + report::scan_pictures({scan, surfels, primitives}, 480) + "</div>" +
-                     report::picture_legend() + "</section>\n" +
+  std::string body = report::warning_lines(warnings, scan.warnings) +
+                     report::section("pictures", "Seven pictures", "") + "<div class=\"pics\">" +
+                     report::scan_pictures({scan, surfels, primitives}, 480) + "</div>" + report::picture_legend() +
+                     "</section>\n" +
                      report::primitives_section(primitives.items, scan.input_from_camera, "In the input's frame.");
   if (context.times) {
     contents.push_back({"time", "Time"});
@@ -119,20 +132,24 @@ void write_part_report(const std::filesystem::path& dir, const Part& part, const
                        const StageTimes& times, const ReportContext& context) {
   const Vec3 size = part.box_max - part.box_min;
   const std::size_t turns = part.symmetry.discrete.size() > 1 ? part.symmetry.discrete.size() - 1 : 0;
-  std::string lead = report::number(size.x(), 1) + " × " + report::number(size.y(), 1) + " × " + report::number(size.z(), 1) +
-                     " mm, diameter " + report::number(part.diameter_mm, 1) + " mm. ";
+  std::string lead = report::number(size.x(), 1) + " × " + report::number(size.y(), 1) + " × " +
+                     report::number(size.z(), 1) + " mm, diameter " + report::number(part.diameter_mm, 1) + " mm. ";
   lead += !part.symmetry.continuous.empty() ? "Turning about one axis leaves it as it is. "
-          : turns == 0                      ? "No turn leaves it as it is. "
-                                            : std::to_string(turns) + (turns == 1 ? " turn leaves it as it is. " : " turns leave it as it is. ");
+          : turns == 0
+              ? "No turn leaves it as it is. "
+              : std::to_string(turns) + (turns == 1 ? " turn leaves it as it is. " : " turns leave it as it is. ");
   if (!part.self_similar.empty())
-    lead += std::to_string(part.self_similar.size()) + " further pose" + (part.self_similar.size() == 1 ? " leaves" : "s leave") +
+    lead += std::to_string(part.self_similar.size()) + " further pose" +
+            (part.self_similar.size() == 1 ? " leaves" : "s leave") +
             " most of its surface in place: these are the ones to mistake it for.";
   const std::string body = report::warning_lines({}, part.warnings) + report::section("pictures", "Pictures", "") +
-                           "<div class=\"two\">" + report::part_pictures(part, 720) + "</div>" + report::picture_legend() +
-                           "</section>\n" + report::primitives_section(part.model.primitives, Pose::Identity(), "In the CAD's frame.") +
+                           "<div class=\"two\">" + report::part_pictures(part, 720) + "</div>" +
+                           report::picture_legend() + "</section>\n" +
+                           report::primitives_section(part.model.primitives, Pose::Identity(), "In the CAD's frame.") +
                            report::again_section(context);
-  write_page(dir, report::page("tribin: " + part.name, part.name, lead, part.warnings.empty() ? "ok" : "warn", "compiled",
-                               {{"pictures", "Pictures"}, {"primitives", "Primitives"}, {"again", "Run it again"}}, body),
+  write_page(dir,
+             report::page("tribin: " + part.name, part.name, lead, part.warnings.empty() ? "ok" : "warn", "compiled",
+                          {{"pictures", "Pictures"}, {"primitives", "Primitives"}, {"again", "Run it again"}}, body),
              part_json(part, file, times, {.times = context.times}));
 }
 

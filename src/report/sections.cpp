@@ -23,7 +23,8 @@ std::string named(std::span<const Part> parts, const std::string& name) {
 
 std::string head(const std::vector<std::string>& columns, std::size_t text_columns) {
   std::string out = "<div class=\"box\"><table><thead><tr>";
-  for (std::size_t i = 0; i < columns.size(); ++i) out += (i < text_columns ? "<th>" : "<th class=\"num\">") + columns[i] + "</th>";
+  for (std::size_t i = 0; i < columns.size(); ++i)
+    out += (i < text_columns ? "<th>" : "<th class=\"num\">") + columns[i] + "</th>";
   return out + "</tr></thead><tbody>";
 }
 const char* const kTail = "</tbody></table></div>\n";
@@ -35,7 +36,8 @@ std::string open_directions(const Instance& instance) {
     out += "Free by symmetry: " + std::to_string(instance.free_directions.size()) + " direction" +
            (instance.free_directions.size() == 1 ? "" : "s") + ". ";
   for (const WeakDirection& weak : instance.weak_directions)
-    out += "Weak: σ " + number(weak.sigma_mm, 2) + " mm, " + number(weak.sigma / kDegree, 2) + "°. " + escaped(weak.cure) + ". ";
+    out += "Weak: σ " + number(weak.sigma_mm, 2) + " mm, " + number(weak.sigma / kDegree, 2) + "°. " +
+           escaped(weak.cure) + ". ";
   for (const Alternative& other : instance.alternatives)
     out += "Undecided: another pose with probability " + number(other.probability, 2) + ", decided by " +
            escaped(other.decided_by) + ". ";
@@ -47,21 +49,30 @@ std::string open_directions(const Instance& instance) {
 std::string warning_lines(const std::vector<Warning>& warnings, const std::vector<std::string>& more) {
   std::string out;
   for (const auto& entry : json::warnings(warnings, more))
-    out += "<div class=\"warning\" role=\"note\">" + state_icon("warn") + "<span>" + escaped(entry["text"].get<std::string>()) +
-           "</span></div>\n";
+    out += "<div class=\"warning\" role=\"note\">" + state_icon("warn") + "<span>" +
+           escaped(entry["text"].get<std::string>()) + "</span></div>\n";
   return out;
 }
 
 std::string poses_section(const Scan& scan, std::span<const Part> parts, const Found& found,
                           const std::optional<ReportTruth>& truth) {
-  std::string out = section("poses", "Poses",
-                            "camera_from_part: where each part's CAD origin lies in the input's frame. Rx Ry Rz as Yaskawa counts "
-                            "them: R = Rz Ry Rx. σ is one standard deviation along the worst axis, at the centre of the part's "
-                            "box, noise and systematic terms together." +
-                                std::string(truth ? " The last two columns compare with the simulated truth." : ""));
+  std::string out =
+      section("poses", "Poses",
+              "camera_from_part: where each part's CAD origin lies in the input's frame. Rx Ry Rz as Yaskawa counts "
+              "them: R = Rz Ry Rx. σ is one standard deviation along the worst axis, at the centre of the part's "
+              "box, noise and systematic terms together." +
+                  std::string(truth ? " The last two columns compare with the simulated truth." : ""));
   if (found.instances.items.empty()) return out + "<p>No part is given out.</p></section>\n";
-  std::vector<std::string> columns = {"Part", "Score", "Visible", "x" + unit("mm"), "y" + unit("mm"), "z" + unit("mm"),
-                                      "Rx" + unit("deg"), "Ry" + unit("deg"), "Rz" + unit("deg"), "σ" + unit("mm"),
+  std::vector<std::string> columns = {"Part",
+                                      "Score",
+                                      "Visible",
+                                      "x" + unit("mm"),
+                                      "y" + unit("mm"),
+                                      "z" + unit("mm"),
+                                      "Rx" + unit("deg"),
+                                      "Ry" + unit("deg"),
+                                      "Rz" + unit("deg"),
+                                      "σ" + unit("mm"),
                                       "σ" + unit("deg")};
   std::optional<eval::Judgement> judged;
   if (truth) {
@@ -105,7 +116,8 @@ namespace {
 
 /// One row; `beyond` counts those that differ by more than 3 sigma.
 std::string evidence_row(const Evidence& e, int& beyond) {
-  std::string out = "<tr><td>" + type_icon(e.type) + " " + escaped(e.primitive) + (e.radius_nominal_mm ? ", r" : "") + "</td>";
+  std::string out =
+      "<tr><td>" + type_icon(e.type) + " " + escaped(e.primitive) + (e.radius_nominal_mm ? ", r" : "") + "</td>";
   std::optional<double> nominal = e.radius_nominal_mm, measured = e.radius_measured_mm, sigma = e.radius_sigma_mm;
   if (!nominal && e.offset_mm) nominal = 0, measured = e.offset_mm, sigma = e.offset_sigma_mm;
   if (nominal && measured && sigma && *sigma > 0) {
@@ -125,9 +137,10 @@ std::string evidence_row(const Evidence& e, int& beyond) {
 }  // namespace
 
 std::string evidence_section(std::span<const Part> parts, const Found& found) {
-  std::string out = section("evidence", "Evidence",
-                            "Every primitive that was matched, measured without its nominal value; planes by their place along "
-                            "the normal. Ticks mark 3 σ.");
+  std::string out =
+      section("evidence", "Evidence",
+              "Every primitive that was matched, measured without its nominal value; planes by their place along "
+              "the normal. Ticks mark 3 σ.");
   constexpr std::size_t kMost = 12;  // a page, not a data base: the JSON has them all
   std::string tables;
   int beyond = 0, rows = 0;
@@ -141,7 +154,8 @@ std::string evidence_section(std::span<const Part> parts, const Found& found) {
   }
   if (found.instances.items.empty()) tables = "<p>There is none: no part is given out.</p>";
   if (beyond > 0)
-    out += "<p>" + std::to_string(beyond) + " of " + std::to_string(rows) + " differ from the CAD by more than 3 σ.</p>";
+    out +=
+        "<p>" + std::to_string(beyond) + " of " + std::to_string(rows) + " differ from the CAD by more than 3 σ.</p>";
   if (found.instances.items.size() > kMost)
     out += "<p>The best " + std::to_string(kMost) + " instances; report.json has all.</p>";
   return out + "<div class=\"two\">" + tables + "</div></section>\n";
@@ -184,9 +198,12 @@ std::string why_not_section(std::span<const Part> parts, const Found& found) {
     const double size = std::max(std::abs(r.value), std::abs(r.limit));
     const int decimals = size >= 100 ? 0 : size >= 1 ? 2 : 3;
     out += "<tr><td>" + named(parts, r.part) +
-           (r.nearest_instance > 0 ? " <span class=\"muted\">" + number(r.nearest_mm, 0) + " mm from " + std::to_string(r.nearest_instance) + "</span>" : "") +
+           (r.nearest_instance > 0 ? " <span class=\"muted\">" + number(r.nearest_mm, 0) + " mm from " +
+                                         std::to_string(r.nearest_instance) + "</span>"
+                                   : "") +
            "</td><td class=\"wrap\">" + sentence_of(r) + " <span class=\"muted\">" + escaped(r.stage + ", " + r.test) +
-           "</span></td>" + cell(number(r.value, decimals)) + cell(number(r.limit, decimals)) + cell(grouped(r.count)) + "</tr>";
+           "</span></td>" + cell(number(r.value, decimals)) + cell(number(r.limit, decimals)) + cell(grouped(r.count)) +
+           "</tr>";
   }
   return out + kTail + "</section>\n";
 }
@@ -201,20 +218,27 @@ std::string time_section(const StageTimes& times, int threads) {
                               {"segmentation", "segmentation", 6926.70},
                               {"modelling", "modelling", 8458.12},
                               {"recognition_and_pose", "recognition and pose", 1127.30}};
-  const auto bar = [](double ms) { return number(std::clamp((std::log10(std::max(ms, 0.1)) + 1) / 6 * 100, 0.0, 100.0), 1) + "%"; };
-  const auto row = [&](const std::string& words, double ours, double paper) {
-    return "<span>" + words + "</span><span class=\"tr\"><i class=\"paper\" style=\"width:" + (paper > 0 ? bar(paper) : "0") +
-           "\"></i><i class=\"ours\" style=\"width:" + bar(ours) + "\"></i></span><span class=\"num\">" +
-           (ours >= 100 ? grouped(std::llround(ours)) : number(ours, 1)) + unit("ms") + "</span><span class=\"num t2\">" +
-           (paper > 0 ? grouped(std::llround(paper)) + unit("ms") : "–") + "</span>";
+  const auto bar = [](double ms) {
+    return number(std::clamp((std::log10(std::max(ms, 0.1)) + 1) / 6 * 100, 0.0, 100.0), 1) + "%";
   };
-  std::string out = section("time", "Time",
-                            "Milliseconds a stage on " + (threads > 0 ? std::to_string(threads) : std::string("all")) +
-                                (threads == 1 ? " thread" : " threads") +
-                                ", bars on a logarithmic scale from 0.1 ms to 100 s. Grey: the paper's table I, on a Core 2 Duo E7500.");
-  out += "<div class=\"box\"><div class=\"lg\"><span></span><span></span><span class=\"hd\">tribin</span><span class=\"hd\">paper</span>";
+  const auto row = [&](const std::string& words, double ours, double paper) {
+    return "<span>" + words +
+           "</span><span class=\"tr\"><i class=\"paper\" style=\"width:" + (paper > 0 ? bar(paper) : "0") +
+           "\"></i><i class=\"ours\" style=\"width:" + bar(ours) + "\"></i></span><span class=\"num\">" +
+           (ours >= 100 ? grouped(std::llround(ours)) : number(ours, 1)) + unit("ms") +
+           "</span><span class=\"num t2\">" + (paper > 0 ? grouped(std::llround(paper)) + unit("ms") : "–") + "</span>";
+  };
+  std::string out = section(
+      "time", "Time",
+      "Milliseconds a stage on " + (threads > 0 ? std::to_string(threads) : std::string("all")) +
+          (threads == 1 ? " thread" : " threads") +
+          ", bars on a logarithmic scale from 0.1 ms to 100 s. Grey: the paper's table I, on a Core 2 Duo E7500.");
+  out +=
+      "<div class=\"box\"><div class=\"lg\"><span></span><span></span><span class=\"hd\">tribin</span><span "
+      "class=\"hd\">paper</span>";
   for (const auto& [stage, ms] : times.stages_ms) {
-    const auto known = std::find_if(std::begin(kRows), std::end(kRows), [&, s = stage](const Row& r) { return s == r.stage; });
+    const auto known =
+        std::find_if(std::begin(kRows), std::end(kRows), [&, s = stage](const Row& r) { return s == r.stage; });
     std::string words = stage;
     std::replace(words.begin(), words.end(), '_', ' ');
     out += known == std::end(kRows) ? row(words, ms, 0) : row(known->words, ms, known->paper_ms);
@@ -225,7 +249,9 @@ std::string time_section(const StageTimes& times, int threads) {
 std::string again_section(const ReportContext& context) {
   std::string command;
   for (const std::string& word : context.command) {
-    const bool plain = !word.empty() && word.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-+=./,:") == std::string::npos;
+    const bool plain = !word.empty() && word.find_first_not_of(
+                                            "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-+=./,:") ==
+                                            std::string::npos;
     std::string quoted = word;
     if (!plain) {
       quoted = "'";
@@ -234,27 +260,32 @@ std::string again_section(const ReportContext& context) {
     }
     command += (command.empty() ? "" : " ") + quoted;
   }
-  std::string out = section("again", "Run it again", "") + "<pre>" + escaped(command) + "</pre><p style=\"margin-top:8px\">tribin " +
-                    std::string(TRIBIN_VERSION) + ", schema 1. SHA-256 of the inputs: ";
+  std::string out = section("again", "Run it again", "") + "<pre>" + escaped(command) +
+                    "</pre><p style=\"margin-top:8px\">tribin " + std::string(TRIBIN_VERSION) +
+                    ", schema 1. SHA-256 of the inputs: ";
   for (std::size_t i = 0; i < context.files.size(); ++i)
     out += (i ? ", " : "") + escaped(context.files[i].filename().string()) + " <code>" +
            sha256_of_file(context.files[i].string()).substr(0, 16) + "…</code>";
   return out + ". The same input gives the same answer, whatever the number of threads.</p></section>\n";
 }
 
-std::string primitives_section(const std::vector<Primitive>& primitives, const Pose& b_from_a, const std::string& lead) {
+std::string primitives_section(const std::vector<Primitive>& primitives, const Pose& b_from_a,
+                               const std::string& lead) {
   std::string out = section("primitives", "Primitives", lead) +
-                    head({"Id", "Type", "Area" + unit("mm²"), "Radius" + unit("mm"), "Height" + unit("mm"), "Arc" + unit("deg"),
-                          "Axis or normal", "rms" + unit("mm"), "Points"}, 2);
+                    head({"Id", "Type", "Area" + unit("mm²"), "Radius" + unit("mm"), "Height" + unit("mm"),
+                          "Arc" + unit("deg"), "Axis or normal", "rms" + unit("mm"), "Points"},
+                         2);
   for (const Primitive& p : primitives) {
     const Vec3 axis = b_from_a.linear() * p.axis;
     const bool round = p.type == PrimitiveType::cylinder || p.type == PrimitiveType::sphere;
     const bool high = p.type == PrimitiveType::cylinder || p.type == PrimitiveType::cone;
     out += "<tr><td>" + std::to_string(p.id) + "</td><td>" + type_icon(p.type) + " " + name_of(p.type) +
-           (p.concave ? " <span class=\"muted\">concave</span>" : "") + (p.name.empty() ? "" : " " + escaped(p.name)) + "</td>" +
-           cell(number(p.area_mm2, 1)) + cell(round ? number(p.radius_mm, 3) : "–") + cell(high ? number(p.height_mm(), 2) : "–") +
-           cell(high ? number(p.arc / kDegree, 0) : "–") +
-           cell(p.type == PrimitiveType::sphere ? "–" : number(axis.x(), 4) + "  " + number(axis.y(), 4) + "  " + number(axis.z(), 4)) +
+           (p.concave ? " <span class=\"muted\">concave</span>" : "") + (p.name.empty() ? "" : " " + escaped(p.name)) +
+           "</td>" + cell(number(p.area_mm2, 1)) + cell(round ? number(p.radius_mm, 3) : "–") +
+           cell(high ? number(p.height_mm(), 2) : "–") + cell(high ? number(p.arc / kDegree, 0) : "–") +
+           cell(p.type == PrimitiveType::sphere
+                    ? "–"
+                    : number(axis.x(), 4) + "  " + number(axis.y(), 4) + "  " + number(axis.z(), 4)) +
            cell(number(p.rms_mm, 4)) + cell(grouped(p.points)) + "</tr>";
   }
   return out + kTail + "</section>\n";

@@ -142,8 +142,8 @@ void draw_edges(Canvas& canvas, const Mesh& mesh, const std::vector<Edge>& edges
     for (const Edge& edge : edges) {
       const bool silhouette = edge.right >= 0 && faces_viewer[edge.left] != faces_viewer[edge.right];
       if (!edge.crease && !silhouette) continue;
-      canvas.line(b_from_part * mesh.vertices[edge.a].cast<double>(), b_from_part * mesh.vertices[edge.b].cast<double>(), m,
-                  width, slack);
+      canvas.line(b_from_part * mesh.vertices[edge.a].cast<double>(),
+                  b_from_part * mesh.vertices[edge.b].cast<double>(), m, width, slack);
     }
   };
   if (halo_px > 0) draw(Material::halo, width_px + 2 * halo_px);

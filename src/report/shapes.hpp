@@ -5,7 +5,8 @@
 
 namespace tribin::report {
 
-/// The point of a primitive's untrimmed surface nearest to x, and the surface's normal there (outward, away from the axis).
+/// The point of a primitive's untrimmed surface nearest to x, and the surface's normal there (outward, away from the
+/// axis).
 struct SurfacePoint {
   Vec3 point = Vec3::Zero();
   Vec3 normal = Vec3::UnitZ();

@@ -13,7 +13,8 @@ namespace {
 /// Pixel at the middle of a surfel's cell.
 std::pair<int, int> pixel_of(const Surfels& surfels, std::size_t i) {
   const int cells = surfels.surfel_of_cell.width, cell = static_cast<int>(surfels.cell[i]);
-  return {(cell % cells) * surfels.cell_px + surfels.cell_px / 2, (cell / cells) * surfels.cell_px + surfels.cell_px / 2};
+  return {(cell % cells) * surfels.cell_px + surfels.cell_px / 2,
+          (cell / cells) * surfels.cell_px + surfels.cell_px / 2};
 }
 
 void add_primitives(Sighting& out, const Surfels& surfels, const Primitives& primitives) {
@@ -21,7 +22,8 @@ void add_primitives(Sighting& out, const Surfels& surfels, const Primitives& pri
   for (std::uint32_t i : out.surfels) here[i] = 1;
   for (std::size_t k = 0; k < primitives.items.size(); ++k) {
     const Primitive& p = primitives.items[k];
-    const auto inside = std::count_if(p.surfels.begin(), p.surfels.end(), [&](std::uint32_t i) { return here[i] != 0; });
+    const auto inside =
+        std::count_if(p.surfels.begin(), p.surfels.end(), [&](std::uint32_t i) { return here[i] != 0; });
     if (2 * inside > static_cast<std::ptrdiff_t>(p.surfels.size())) out.primitives.push_back(static_cast<int>(k));
   }
   std::stable_sort(out.primitives.begin(), out.primitives.end(),
@@ -71,7 +73,7 @@ namespace {
 /// The points of every `stride`-th pixel: the mean over its block where the block has no depth edge.
 struct Grid {
   int width = 0, height = 0;
-  std::vector<Vec3f> points;   ///< NaN = none
+  std::vector<Vec3f> points;  ///< NaN = none
 };
 
 Grid grid_of(const Scan& scan, const Sighting& where, int stride) {
@@ -108,7 +110,8 @@ Vec3f normal_at(const Grid& grid, const Surfels& surfels, int u, int v, int i, i
       return surfels.normal[surfels.surfel_of_cell(cu, cv)];
   }
   const auto at = [&](int a, int b) {
-    return grid.points[static_cast<std::size_t>(std::clamp(b, 0, grid.height - 1)) * grid.width + std::clamp(a, 0, grid.width - 1)];
+    return grid.points[static_cast<std::size_t>(std::clamp(b, 0, grid.height - 1)) * grid.width +
+                       std::clamp(a, 0, grid.width - 1)];
   };
   const Vec3f here = at(i, j);
   Vec3f du = at(i + 1, j) - at(i - 1, j), dv = at(i, j + 1) - at(i, j - 1);

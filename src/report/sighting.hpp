@@ -9,10 +9,10 @@ namespace tribin::report {
 
 /// The pixels, surfels and primitives of a scan that one instance explains (or all of them, for a segmentation alone).
 struct Sighting {
-  int u0 = 0, v0 = 0, u1 = 0, v1 = 0;   ///< rectangle of pixels, u1 and v1 one past the end
-  Image<std::uint8_t> on_part;          ///< whole scan: 1 = on the part; empty = all pixels count
+  int u0 = 0, v0 = 0, u1 = 0, v1 = 0;  ///< rectangle of pixels, u1 and v1 one past the end
+  Image<std::uint8_t> on_part;         ///< whole scan: 1 = on the part; empty = all pixels count
   std::vector<std::uint32_t> surfels;
-  std::vector<int> primitives;          ///< places in Primitives::items with most of their surfels here, largest first
+  std::vector<int> primitives;  ///< places in Primitives::items with most of their surfels here, largest first
 };
 
 Sighting sighting_of(const Scan& scan, const Surfels& surfels, const Primitives& primitives, const Part& part,
@@ -24,7 +24,7 @@ struct PixelLook {
   Material material = Material::grey;
   std::uint8_t step = 0;
   float tint = 0;
-  const Primitive* onto = nullptr;   ///< draw the pixel's point on this surface instead
+  const Primitive* onto = nullptr;  ///< draw the pixel's point on this surface instead
 };
 
 /// The scan inside a rectangle as triangles, every `stride` pixels; holes stay holes, depth edges are not bridged.

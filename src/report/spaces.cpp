@@ -9,11 +9,11 @@
 namespace tribin::report {
 namespace {
 
-constexpr double kRadius = 84, kMiddle = 100;   // of a picture of 200 x 200
+constexpr double kRadius = 84, kMiddle = 100;  // of a picture of 200 x 200
 constexpr double kTilt = -30 * kDegree;
 
 struct Spot {
-  double x, y, z;   ///< z > 0 faces the reader
+  double x, y, z;  ///< z > 0 faces the reader
 };
 
 Spot on_sphere(const Vec3& v) {
@@ -62,7 +62,8 @@ struct Dots {
     for (int level = 0; level < kVoteColours; ++level) {
       if (path[level].empty()) continue;
       out += "<path class=\"dot m" + std::to_string(level) + "\" stroke-width=\"" +
-             text("%.1f", width0 + (width1 - width0) * level / (kVoteColours - 1), 0) + "\" d=\"" + path[level] + "\"/>";
+             text("%.1f", width0 + (width1 - width0) * level / (kVoteColours - 1), 0) + "\" d=\"" + path[level] +
+             "\"/>";
     }
     return out;
   }
@@ -164,7 +165,8 @@ std::string disc_svg(const std::vector<float>& bins, const std::vector<PeakMark>
     for (std::size_t i = 0; i < bins.size(); ++i) {
       const double level = bins[i] > 0 ? 1 + std::log10(bins[i] / most) / 3 : -1;
       if (level > 0)
-        dots.add(std::min(kVoteColours - 1, static_cast<int>(level * kVoteColours)), on_disc(centres[i].cast<double>()));
+        dots.add(std::min(kVoteColours - 1, static_cast<int>(level * kVoteColours)),
+                 on_disc(centres[i].cast<double>()));
     }
   }
   out += dots.svg(4.6, 4.6) + "<path class=\"graticule\" d=\"";

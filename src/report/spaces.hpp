@@ -7,7 +7,7 @@
 
 namespace tribin::report {
 
-inline constexpr int kVoteColours = 12;   ///< CSS classes m0 .. m11 of the page's style
+inline constexpr int kVoteColours = 12;  ///< CSS classes m0 .. m11 of the page's style
 
 /// A peak to be ringed, with its label.
 struct PeakMark {
@@ -19,7 +19,7 @@ struct CircleMark {
   Vec3 axis = Vec3::UnitZ();
   double d = 0;
   std::string label;
-  std::string type;   ///< CSS class: cylinder, cone
+  std::string type;  ///< CSS class: cylinder, cone
 };
 
 /// Area of the surfels' normals (as axes: z >= 0) in the bins of a golden spiral.

@@ -56,7 +56,8 @@ std::string verdict(const Found& found, std::span<const Part> parts) {
   }
   std::vector<std::string> words;
   for (const Part& part : parts) {
-    const auto count = std::count_if(items.begin(), items.end(), [&](const Instance& i) { return i.part == part.name; });
+    const auto count =
+        std::count_if(items.begin(), items.end(), [&](const Instance& i) { return i.part == part.name; });
     if (count == 1) words.push_back(part.name);
     if (count > 1) words.push_back(std::to_string(count) + " " + part.name);
   }

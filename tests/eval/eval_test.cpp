@@ -20,7 +20,8 @@ Pose random_pose(std::mt19937& random) {
 Model prism() {
   Model model;
   model.name = "prism";
-  for (int i = 0; i < 8; ++i) model.vertices.push_back({i & 1 ? 10.f : -10.f, i & 2 ? 10.f : -10.f, i & 4 ? 50.f : 0.f});
+  for (int i = 0; i < 8; ++i)
+    model.vertices.push_back({i & 1 ? 10.f : -10.f, i & 2 ? 10.f : -10.f, i & 4 ? 50.f : 0.f});
   model.diameter_mm = std::sqrt(400.0 + 400 + 2500);
   model.box_center = Vec3(0, 0, 25);
   for (int k = 0; k < 4; ++k) {
@@ -53,7 +54,8 @@ TEST(PoseError, ReturnsTheMotionThatWasApplied) {
     std::mt19937 random(seed);
     std::normal_distribution<double> gauss;
     const Pose truth = random_pose(random);
-    const Vec3 shift(gauss(random), gauss(random), gauss(random)), turn = 0.01 * Vec3(gauss(random), gauss(random), gauss(random));
+    const Vec3 shift(gauss(random), gauss(random), gauss(random)),
+        turn = 0.01 * Vec3(gauss(random), gauss(random), gauss(random));
     // Turn about the box's centre, then shift.
     const Vec3 center = truth * model.box_center;
     Pose answer = truth;

@@ -15,35 +15,36 @@ namespace tribin::eval {
 /// What judging needs of a part: its points and its true symmetries.
 struct Model {
   std::string name;
-  std::vector<Vec3f> vertices;   ///< part frame [mm]
+  std::vector<Vec3f> vertices;  ///< part frame [mm]
   double diameter_mm = 0;
   Vec3 box_center = Vec3::Zero();
-  SymmetryGroup symmetry;        ///< no discrete entry means the identity alone
+  SymmetryGroup symmetry;  ///< no discrete entry means the identity alone
 };
 
 /// A part that is really there.
 struct Truth {
   std::string part;
   Pose camera_from_part = Pose::Identity();
-  double visible_fraction = 1;   ///< BOP visib_fract
+  double visible_fraction = 1;  ///< BOP visib_fract
 };
 
 /// How far an answer is from a truth, modulo the symmetry that brings them closest.
 struct PoseError {
-  double mssd_mm = 0;                    ///< largest distance of one vertex in both poses
-  double translation_mm = 0;             ///< at the centre of the box
-  double rotation = 0;                   ///< [rad]
+  double mssd_mm = 0;                       ///< largest distance of one vertex in both poses
+  double translation_mm = 0;                ///< at the centre of the box
+  double rotation = 0;                      ///< [rad]
   Vec3 translation_axes_mm = Vec3::Zero();  ///< answer minus truth at the centre of the box, camera axes
-  Vec3 rotation_axes = Vec3::Zero();     ///< w with R_answer = Exp(w) R_truth [rad], camera axes
+  Vec3 rotation_axes = Vec3::Zero();        ///< w with R_answer = Exp(w) R_truth [rad], camera axes
 };
 
-/// \source BOP's MSSD (Hodan et al. 2020); over a continuous symmetry the angle of least rotation is taken in closed form
+/// \source BOP's MSSD (Hodan et al. 2020); over a continuous symmetry the angle of least rotation is taken in closed
+/// form
 ///         instead of BOP's steps of 0.01 diameters. It can only make the error larger than the true minimum.
 PoseError pose_error(const Model& model, const Pose& answer, const Pose& truth);
 
 struct Match {
-  int answer = 0;   ///< index
-  int truth = 0;    ///< index
+  int answer = 0;  ///< index
+  int truth = 0;   ///< index
   PoseError error;
 };
 
@@ -70,7 +71,8 @@ std::vector<Model> read_bop_models(const std::filesystem::path& models_dir);
 /// The true instances of one image; names come from the models, by id.
 /// \param scene_gt  path of scene_gt.json; scene_gt_info.json beside it gives the visible fractions, if it is there.
 /// \throws Error bad_input
-std::vector<Truth> read_bop_truth(const std::filesystem::path& scene_gt, int image, const std::filesystem::path& models_dir);
+std::vector<Truth> read_bop_truth(const std::filesystem::path& scene_gt, int image,
+                                  const std::filesystem::path& models_dir);
 
 /// A share with its 95 % interval.
 struct Share {

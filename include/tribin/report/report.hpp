@@ -12,10 +12,10 @@ namespace tribin {
 
 /// What the report says beside the result itself.
 struct ReportContext {
-  std::vector<std::string> command;        ///< argv, to run it again
+  std::vector<std::string> command;          ///< argv, to run it again
   std::vector<std::filesystem::path> files;  ///< inputs, whose SHA-256 is given
   int threads = 0;
-  bool times = true;                       ///< false: the same input gives the same page
+  bool times = true;  ///< false: the same input gives the same page
 };
 
 /// The truth of a simulated scan.
@@ -25,9 +25,8 @@ struct ReportTruth {
 };
 
 /// Writes DIR/index.html, one self-contained page (no network, no script, light and dark, A4), and DIR/report.json, the
-/// same bytes as locate_json. Order: verdict, warnings, poses, ten pictures a part, evidence, why not, time, run it again.
-/// \param dir  is made when missing.
-/// \throws Error bad_option when the folder cannot be written.
+/// same bytes as locate_json. Order: verdict, warnings, poses, ten pictures a part, evidence, why not, time, run it
+/// again. \param dir  is made when missing. \throws Error bad_option when the folder cannot be written.
 void write_locate_report(const std::filesystem::path& dir, const Scan& scan, std::span<const Part> parts,
                          const Found& found, const ReportContext& context,
                          const std::optional<ReportTruth>& truth = {});
