@@ -68,12 +68,12 @@ int run(const fs::path& data, int first, int last) {
     std::printf("  %.1f\n", times.back());
     for (const Reason& r : found.instances.rejected)
       if (judged.found.empty())
-        std::printf("        %s: %s, %s: %.4g, limit %.4g, %d times\n", r.part.c_str(), r.stage.c_str(), r.test.c_str(), r.value,
-                    r.limit, r.count);
+        std::printf("        %s: %s, %s: %.4g, limit %.4g, %d times\n", r.part.c_str(), r.stage.c_str(), r.test.c_str(),
+                    r.value, r.limit, r.count);
   }
   const eval::Share share = eval::share_of(found_count, asked);
-  std::printf("found %d of %d (95 %% interval %.3f to %.3f), false answers %d\n", share.count, share.of, share.low, share.high,
-              false_count);
+  std::printf("found %d of %d (95 %% interval %.3f to %.3f), false answers %d\n", share.count, share.of, share.low,
+              share.high, false_count);
   std::printf("translation median %.4f mm, 95 %% %.4f mm; rotation median %.4f deg, 95 %% %.4f deg\n",
               eval::quantile(translations, 0.5), eval::quantile(translations, 0.95), eval::quantile(rotations, 0.5),
               eval::quantile(rotations, 0.95));
