@@ -127,7 +127,8 @@ Refinement refine_pose(const RenderMesh& mesh, const SceneDepth& scene, const Po
   Refinement out;
   out.camera_from_part = start;
   thread_local IndexRender render;
-  const double end_scale = 3 * std::hypot(scene.median_sigma_mm, options.cad_sigma_mm);
+  // The kernel ends at 3 local sigma (accumulate); the schedule falls below that everywhere.
+  const double end_scale = 3 * std::hypot(0.3 * scene.median_sigma_mm, options.cad_sigma_mm);
   const double ratio = std::pow(std::max(1.0, options.start_scale_mm / end_scale), 1.0 / std::max(1, options.iterations - 2));
   double scale = options.start_scale_mm;
   for (int it = 0; it <= options.iterations; ++it) {
