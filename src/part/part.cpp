@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "tribin/core/error.hpp"
+#include "tribin/part/symmetry.hpp"
 #include "views.hpp"
 
 namespace tribin {
@@ -63,7 +64,9 @@ Part compile_part(const Mesh& mesh, const PartOptions& options) {
   part.primitive_of_triangle = primitives.label_of_surfel;
   TRIBIN_ASSERT(part.primitive_of_triangle.size() == mesh.triangles.size());
   make_views(part);
-  part.symmetry.discrete = {Pose::Identity()};
+  SymmetryResult symmetry = find_symmetries(part.mesh);
+  part.symmetry = std::move(symmetry.group);
+  part.self_similar = std::move(symmetry.self_similar);
   part.warnings = mesh.warnings;
   return part;
 }

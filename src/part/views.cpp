@@ -1,5 +1,6 @@
 #include "views.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <numeric>
@@ -25,6 +26,24 @@ std::vector<std::uint32_t> golden_order(std::size_t n) {
   std::size_t k = 0;
   for (std::size_t i = 0; i < n; ++i, k = (k + stride) % n) order[i] = static_cast<std::uint32_t>(k);
   return order;
+}
+
+void measure_extents(PartView& view) {
+  if (view.points.empty()) return;
+  Vec3 u, v;
+  orthonormal_basis(view.direction, u, v);
+  std::vector<double> along(view.points.size());
+  for (int k = 0; k < kViewAngles; ++k) {
+    const double a = 2 * kPi * k / kViewAngles;
+    const Vec3 d = u * std::cos(a) + v * std::sin(a);
+    for (std::size_t i = 0; i < along.size(); ++i) along[i] = d.dot(view.points[i].cast<double>());
+    const auto low = along.begin() + static_cast<std::ptrdiff_t>(along.size() / 100);
+    const auto high = along.end() - 1 - static_cast<std::ptrdiff_t>(along.size() / 100);
+    std::nth_element(along.begin(), low, along.end());
+    const double first = *low;
+    std::nth_element(along.begin(), high, along.end());
+    view.extents.push_back(Vec2(first, *high));
+  }
 }
 
 }  // namespace
@@ -106,6 +125,7 @@ void make_views(Part& part) {
       const auto triangle = static_cast<std::size_t>(render.triangle[p]);
       view.normals.push_back((part_from_camera.linear() * render.normal[triangle].cast<double>()).cast<float>());
     }
+    measure_extents(view);
   });
   part.exposed_mm2.assign(part.model.primitives.size(), 0.0);
   for (const auto& e : exposed)

@@ -1,6 +1,7 @@
 #include "tribin/pose/look_up.hpp"
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -77,7 +78,7 @@ void look(const SceneDepth& scene, const FastPose& pose, const Vec3f& point, con
     if (agree > kNormalAgrees)
       ++out.supported;
     else if (m[0] == 0 && m[1] == 0 && m[2] == 0)
-      ++out.no_data;  // no surfel: an edge or a hole nearby
+      ++out.unsure;
     // else: the right depth by chance; neither for nor against
   }
 }
@@ -101,6 +102,24 @@ LookUp look_up_early(const SceneDepth& scene, const Pose& camera_from_part, std:
   if (first < count && out.score() < hopeless) return out;
   for (std::size_t i = first; i < count; ++i) look(scene, pose, points[i], normals[i], tolerance, out);
   return out;
+}
+
+Pose settle_depth(const SceneDepth& scene, const Pose& camera_from_part, std::span<const Vec3f> points, std::size_t count) {
+  const FastPose fast(camera_from_part);
+  std::vector<float> shifts;
+  for (std::size_t i = 0; i < std::min(count, points.size()); ++i) {
+    const Vec3f q = fast.move(points[i]);
+    const Pixel p = project(scene, q);
+    if (!p.inside) continue;
+    const float z = scene.z_mm(p.u, p.v);
+    if (z > 0) shifts.push_back(z - q[2]);
+  }
+  if (shifts.empty()) return camera_from_part;
+  const auto middle = shifts.begin() + static_cast<std::ptrdiff_t>(shifts.size() / 2);
+  std::nth_element(shifts.begin(), middle, shifts.end());
+  Pose pose = camera_from_part;
+  pose.translation() *= 1 + *middle / pose.translation().z();
+  return pose;
 }
 
 Pose refine_points(const SceneDepth& scene, const Pose& start, std::span<const Vec3f> points,

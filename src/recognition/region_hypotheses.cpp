@@ -6,13 +6,22 @@
 namespace tribin {
 namespace {
 
-constexpr int kSpins = 24;
-
+/// A piece of the scan that no background explains, as the camera sees it.
 struct Region {
-  Vec3 centroid = Vec3::Zero();  ///< of its cells, each counted once: as the camera sees them
-  double reach_mm = 0;
+  Vec3 toward = Vec3::UnitZ();  ///< unit, to the camera
+  Vec3 u, v;                    ///< across it
+  Vec2 along_u, along_v;        ///< 1 % and 99 % quantiles of its cells [mm]
+  double depth = 0;             ///< median along -toward
   int cells = 0;
 };
+
+Vec2 quantiles(std::vector<double>& x) {
+  const auto cut = static_cast<std::ptrdiff_t>(x.size() / 100);
+  std::nth_element(x.begin(), x.begin() + cut, x.end());
+  const double low = x[static_cast<std::size_t>(cut)];
+  std::nth_element(x.begin(), x.end() - 1 - cut, x.end());
+  return {low, *(x.end() - 1 - cut)};
+}
 
 /// Connected pieces of the cell grid that no background primitive explains.
 std::vector<Region> regions(const SceneFeatures& scene, const Part& part) {
@@ -49,13 +58,24 @@ std::vector<Region> regions(const SceneFeatures& scene, const Part& part) {
             stack.emplace_back(xx, yy);
           }
       }
+      if (members.size() < 20) continue;  // a crumb: less than any pose could be verified on
       Region r;
       r.cells = static_cast<int>(members.size());
       Eigen::Vector3d sum = Eigen::Vector3d::Zero();
       for (const std::int32_t s : members) sum += surfels.position[static_cast<std::size_t>(s)].cast<double>();
-      r.centroid = sum / r.cells;
-      for (const std::int32_t s : members)
-        r.reach_mm = std::max(r.reach_mm, (surfels.position[static_cast<std::size_t>(s)].cast<double>() - r.centroid).norm());
+      r.toward = Vec3(-sum.normalized());
+      orthonormal_basis(r.toward, r.u, r.v);
+      std::vector<double> x(members.size()), y(members.size()), z(members.size());
+      for (std::size_t k = 0; k < members.size(); ++k) {
+        const Vec3 p = surfels.position[static_cast<std::size_t>(members[k])].cast<double>();
+        x[k] = r.u.dot(p);
+        y[k] = r.v.dot(p);
+        z[k] = -r.toward.dot(p);
+      }
+      r.along_u = quantiles(x);
+      r.along_v = quantiles(y);
+      std::nth_element(z.begin(), z.begin() + static_cast<std::ptrdiff_t>(z.size() / 2), z.end());
+      r.depth = z[z.size() / 2];
       out.push_back(r);
     }
   return out;
@@ -64,28 +84,31 @@ std::vector<Region> regions(const SceneFeatures& scene, const Part& part) {
 }  // namespace
 
 void hypotheses_from_regions(const SceneFeatures& scene, const Part& part, std::vector<Pose>& out) {
-  double view_area = 0;
-  for (const PartView& v : part.views) view_area = std::max(view_area, v.area_mm2);
-  const PinholeCamera& camera = scene.surfels->scan->camera;
+  // Edges and drop-outs eat a piece of a region's rim, a touching neighbour adds one.
+  constexpr double kSmallest = 0.6, kLargest = 1.3;
+  const auto fits = [](const Vec2& seen, const Vec2& nominal) {
+    const double ratio = (seen[1] - seen[0]) / (nominal[1] - nominal[0]);
+    return ratio > kSmallest && ratio < kLargest;
+  };
   for (const Region& region : regions(scene, part)) {
-    if (region.reach_mm > 0.9 * part.diameter_mm || region.reach_mm < 0.15 * part.diameter_mm) continue;
-    const Eigen::Vector3d toward = -Eigen::Vector3d(region.centroid).normalized();  // to the camera
-    const double pitch = region.centroid.z() / camera.fx * scene.surfels->cell_px;
-    const double seen_area = region.cells * pitch * pitch;
-    Vec3 su, sv;
-    orthonormal_basis(Vec3(toward), su, sv);
     for (const PartView& view : part.views) {
-      // A region holds what is seen of the view, less its drop-outs and edges, plus what touches it.
-      if (view.points.empty() || seen_area > 1.6 * view.area_mm2 || seen_area < 0.25 * view.area_mm2) continue;
-      Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-      for (const Vec3f& p : view.points) mean += p.cast<double>();
-      mean /= static_cast<double>(view.points.size());
+      if (view.points.empty()) continue;
       Vec3 pu, pv;
       orthonormal_basis(view.direction, pu, pv);
-      for (int k = 0; k < kSpins; ++k) {
-        const double a = 2 * kPi * k / kSpins;
-        const Matrix3 r = rotation_from_directions(view.direction, pu, Vec3(toward), su * std::cos(a) + sv * std::sin(a));
-        out.push_back(pose_from(r, Vec3(mean), region.centroid));
+      double middle_depth = 0;
+      for (const Vec3f& p : view.points) middle_depth -= view.direction.dot(p.cast<double>());
+      middle_depth /= static_cast<double>(view.points.size());
+      for (int k = 0; k < kViewAngles; ++k) {
+        // Part direction a(k) = pu cos + pv sin comes to lie on the region's u, a(k + 90 deg) on its v.
+        const Vec2& along_u = view.extents[static_cast<std::size_t>(k)];
+        const Vec2& along_v = view.extents[static_cast<std::size_t>((k + kViewAngles / 4) % kViewAngles)];
+        if (!fits(region.along_u, along_u) || !fits(region.along_v, along_v)) continue;
+        const double a = 2 * kPi * k / kViewAngles;
+        const Vec3 part_u = pu * std::cos(a) + pv * std::sin(a), part_v = pv * std::cos(a) - pu * std::sin(a);
+        const Matrix3 r = rotation_from_directions(view.direction, part_u, region.toward, region.u);
+        const Vec3 part_point = part_u * along_u.mean() + part_v * along_v.mean() - view.direction * middle_depth;
+        const Vec3 scene_point = region.u * region.along_u.mean() + region.v * region.along_v.mean() - region.toward * region.depth;
+        out.push_back(pose_from(r, part_point, scene_point));
       }
     }
   }

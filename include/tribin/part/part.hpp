@@ -34,7 +34,12 @@ struct PartView {
   std::vector<Vec3f> points;        ///< visible surface points, part frame; any prefix covers the view evenly
   std::vector<Vec3f> normals;       ///< their facets' normals
   double area_mm2 = 0;              ///< projected
+  /// Where the seen points begin and end (1 % and 99 % quantiles) along kViewAngles directions across the view: direction k
+  /// lies k * 360 / kViewAngles degrees from u of orthonormal_basis(direction), towards v.
+  std::vector<Vec2> extents;
 };
+
+inline constexpr int kViewAngles = 24;
 
 /// A CAD file made ready for finding it in scans.
 struct Part {
