@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
 namespace tribin {
 namespace {
@@ -10,6 +11,35 @@ struct ScreenVertex {
   float x, y;     ///< window coordinates
   float cx, cy, cz;  ///< camera frame
 };
+
+/// Every edge once, without those between coplanar triangles, which are never an outline.
+std::vector<MeshEdge> outline_edges(const RenderMesh& mesh) {
+  struct Half {
+    std::uint32_t low, high;
+    std::int32_t triangle;
+  };
+  std::vector<Half> halves;
+  halves.reserve(mesh.triangles.size() * 3);
+  for (std::size_t k = 0; k < mesh.triangles.size(); ++k)
+    for (std::size_t i = 0; i < 3; ++i) {
+      const std::uint32_t a = mesh.triangles[k][i], b = mesh.triangles[k][(i + 1) % 3];
+      halves.push_back({std::min(a, b), std::max(a, b), static_cast<std::int32_t>(k)});
+    }
+  std::sort(halves.begin(), halves.end(), [](const Half& a, const Half& b) {
+    return std::tie(a.low, a.high, a.triangle) < std::tie(b.low, b.high, b.triangle);
+  });
+  std::vector<MeshEdge> out;
+  for (std::size_t i = 0; i < halves.size();) {
+    std::size_t j = i + 1;
+    while (j < halves.size() && halves[j].low == halves[i].low && halves[j].high == halves[i].high) ++j;
+    MeshEdge e{{halves[i].low, halves[i].high}, {halves[i].triangle, j > i + 1 ? halves[i + 1].triangle : -1}};
+    const bool coplanar = e.triangles[1] >= 0 && mesh.normals[static_cast<std::size_t>(e.triangles[0])].dot(
+                                                     mesh.normals[static_cast<std::size_t>(e.triangles[1])]) > 0.999999f;
+    if (!coplanar && j - i <= 2) out.push_back(e);
+    i = j;
+  }
+  return out;
+}
 
 }  // namespace
 
@@ -25,6 +55,7 @@ RenderMesh make_render_mesh(const Mesh& mesh) {
     const double length = n.norm();
     out.normals.push_back(length > 0 ? Vec3f((n / length).cast<float>()) : Vec3f(0, 0, 0));
   }
+  out.edges = outline_edges(out);
   if (!mesh.vertices.empty()) {
     out.box_min = out.box_max = mesh.vertices[0].cast<double>();
     for (const Vec3f& v : mesh.vertices) {

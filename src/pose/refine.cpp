@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "tribin/core/parallel.hpp"
+#include "tribin/pose/contour.hpp"
 
 namespace tribin {
 namespace {
@@ -95,30 +96,65 @@ Matrix6 matrix_from(const Sums& s) {
   return h;
 }
 
-/// Solves H x = b with x orthogonal to the frozen directions, in coordinates where radians count `lever` mm. Directions that
-/// hold less than a millionth of the best one's information stay where they are.
-Vector6 solve(const Matrix6& h, const Vector6& b, const std::vector<Vector6>& frozen, double lever) {
-  Eigen::Matrix<double, 6, 1> scale;
-  scale << 1, 1, 1, 1 / lever, 1 / lever, 1 / lever;
-  Eigen::Matrix<double, 6, 6> hs = scale.asDiagonal() * h * scale.asDiagonal();
-  Eigen::Matrix<double, 6, 1> bs = scale.asDiagonal() * b;
-  Eigen::Matrix<double, 6, 6> keep = Eigen::Matrix<double, 6, 6>::Identity();
+using Mat6 = Eigen::Matrix<double, 6, 6>;
+using Vec6 = Eigen::Matrix<double, 6, 1>;
+
+/// Normal equations in coordinates where radians count `lever` mm, without the frozen directions.
+struct System {
+  Mat6 h;
+  Vec6 b;
+};
+
+System scaled(const Matrix6& h, const Vector6& b, const std::vector<Vector6>& frozen, const Vec6& scale) {
+  System s{scale.asDiagonal() * Mat6(h) * scale.asDiagonal(), scale.asDiagonal() * Vec6(b)};
+  Mat6 keep = Mat6::Identity();
   for (const Vector6& f : frozen) {
-    Eigen::Matrix<double, 6, 1> d = f.cwiseQuotient(scale);
-    d = keep * d;
+    Vec6 d = keep * Vec6(f).cwiseQuotient(scale);
     if (d.norm() < 1e-12) continue;
     d.normalize();
     keep -= d * d.transpose();
   }
-  hs = keep * hs * keep;
-  bs = keep * bs;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> eigen(hs);
+  s.h = keep * s.h * keep;
+  s.b = keep * s.b;
+  return s;
+}
+
+/// Directions that hold less than a millionth of the best one's information stay where they are.
+Vec6 solve(const System& s) {
+  const Eigen::SelfAdjointEigenSolver<Mat6> eigen(s.h);
   const double limit = 1e-6 * std::max(eigen.eigenvalues()(5), 1e-300);
-  Eigen::Matrix<double, 6, 1> x = Eigen::Matrix<double, 6, 1>::Zero();
+  Vec6 x = Vec6::Zero();
   for (int k = 0; k < 6; ++k)
     if (eigen.eigenvalues()(k) > limit)
-      x += eigen.eigenvectors().col(k) * (eigen.eigenvectors().col(k).dot(bs) / eigen.eigenvalues()(k));
-  return Vector6(scale.cwiseProduct(x));
+      x += eigen.eigenvectors().col(k) * (eigen.eigenvectors().col(k).dot(s.b) / eigen.eigenvalues()(k));
+  return x;
+}
+
+// Outlines are found to a few tenths of a pixel, systematic parts of it (mixed pixels) included: a direction that the surface holds
+// better than a tenth of a pixel's pitch gains nothing from them.
+constexpr double kWeakPitches = 0.1;
+constexpr double kEdgeReachPx = 6;
+
+/// Adds the outline's equations along the directions that the surface holds worse than `limit_mm`; returns how many there are.
+int hold_weak_directions(Matrix6& information, Vector6& b, const ContourSums& edges, const std::vector<Vector6>& frozen,
+                         const Vec6& scale, double limit_mm) {
+  if (edges.samples < 12) return 0;
+  const System surface = scaled(information, b, frozen, scale);
+  const Eigen::SelfAdjointEigenSolver<Mat6> eigen(surface.h);
+  Mat6 weak = Mat6::Zero();
+  int count = 0;
+  for (int k = 0; k < 6; ++k) {
+    if (eigen.eigenvalues()(k) * limit_mm * limit_mm > 1) continue;
+    weak += eigen.eigenvectors().col(k) * eigen.eigenvectors().col(k).transpose();
+    ++count;
+  }
+  if (count == 0) return 0;
+  const Mat6 s = scale.asDiagonal(), inverse = scale.cwiseInverse().asDiagonal();
+  const Mat6 h = weak * (s * Mat6(edges.information) * s) * weak;
+  const Vec6 pull = weak * (s * Vec6(edges.pull));
+  information += Matrix6(inverse * h * inverse);
+  b += Vector6(inverse * pull);
+  return count;
 }
 
 }  // namespace
@@ -131,20 +167,32 @@ Refinement refine_pose(const RenderMesh& mesh, const SceneDepth& scene, const Po
   const double end_scale = 3 * std::hypot(0.3 * scene.median_sigma_mm, options.cad_sigma_mm);
   const double ratio = std::pow(std::max(1.0, options.start_scale_mm / end_scale), 1.0 / std::max(1, options.iterations - 2));
   double scale = options.start_scale_mm;
+  Vec6 scale6;
+  scale6 << 1, 1, 1, 1 / options.lever_mm, 1 / options.lever_mm, 1 / options.lever_mm;
   for (int it = 0; it <= options.iterations; ++it) {
     const bool final_pass = it == options.iterations;
     const Eigen::Vector3d center = out.camera_from_part * Eigen::Vector3d(options.center);
     render_index(mesh, scene.camera, out.camera_from_part, options.step_px, render);
     const Sums sums =
         accumulate(scene, render, center, std::max(scale, end_scale), options.cad_sigma_mm, final_pass);
-    out.information = matrix_from(sums);
+    // Pixels nearer than the noise's correlation count once.
+    const double independent =
+        1 / std::max(1.0, correlation_inflation(scene.correlation_px) / (double(render.step) * render.step));
+    out.information = matrix_from(sums) * independent;
     out.pixels = sums.pixels;
     out.rms_mm = sums.weight > 0 ? std::sqrt(sums.squares / sums.weight) : 0;
     out.rms_sigma = sums.weight > 0 ? std::sqrt(sums.squares_sigma / sums.weight) : 0;
-    if (final_pass || sums.pixels < 12) break;
+    if (sums.pixels < 12) break;
     Vector6 b;
-    for (int a = 0; a < 6; ++a) b[a] = sums.b[static_cast<std::size_t>(a)];
-    Vector6 delta = solve(out.information, b, options.frozen, options.lever_mm);
+    for (int a = 0; a < 6; ++a) b[a] = sums.b[static_cast<std::size_t>(a)] * independent;
+    if (options.outlines) {
+      const ContourSums edges = contour_sums(mesh, scene, out.camera_from_part, render, Vec3(center), kEdgeReachPx);
+      out.weak_by_surface = hold_weak_directions(out.information, b, edges, options.frozen, scale6,
+                                                 center.z() / scene.camera.fx * kWeakPitches);
+    }
+    if (final_pass) break;
+    const Vec6 step = scale6.cwiseProduct(solve(scaled(out.information, b, options.frozen, scale6)));
+    Vector6 delta(step);
     // A step may not outrun the association: at most the current scale's reach.
     const double length = std::max(delta.head<3>().norm(), delta.tail<3>().norm() * options.lever_mm);
     const double reach = 4 * std::max(scale, end_scale);

@@ -35,13 +35,11 @@ Instance make_instance(const Polished& p, std::span<const Part> parts, const Sce
   // The last word: every pixel (up to 60 000; more gain nothing against systematic terms).
   const int step = step_for(part, scene, p.candidate.camera_from_part, 60000);
   RefineOptions options = refine_options(part, step, 5, std::max(0.002 * part.diameter_mm, 4 * scene.median_sigma_mm));
+  options.outlines = true;
   options.frozen = free_directions_about_center(part, p.candidate.camera_from_part);
   const Refinement refined = refine_pose(part.render_mesh, scene, p.candidate.camera_from_part, options);
   out.camera_from_part = refined.camera_from_part;
-  Refinement whole = refined;
-  whole.information *= double(step) * step;
-  if (step > 1) whole.information /= std::max(1.0, double(step) * step / correlation_inflation(scene.correlation_px));
-  describe_uncertainty(part, scene, noise, whole, out);
+  describe_uncertainty(part, noise, refined, out);
   describe_evidence(part, scene, features, out);
 
   // Rivals by likelihood: those that keep 1 % are told.

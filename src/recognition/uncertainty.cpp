@@ -40,14 +40,12 @@ std::vector<Vector6> free_directions_about_center(const Part& part, const Pose& 
   return out;
 }
 
-void describe_uncertainty(const Part& part, const SceneDepth& scene, const NoiseProfile& noise, const Refinement& refinement,
-                          Instance& instance) {
+void describe_uncertainty(const Part& part, const NoiseProfile& noise, const Refinement& refinement, Instance& instance) {
   const double lever = part.gyration_mm;
   Vec6 scale;
   scale << 1, 1, 1, 1 / lever, 1 / lever, 1 / lever;
   // Fit residuals beyond the noise (a casting, an unknown systematic term) count as noise.
-  const double excess = std::max(1.0, refinement.rms_sigma * refinement.rms_sigma);
-  const double inflation = correlation_inflation(scene.correlation_px) * excess;
+  const double inflation = std::max(1.0, refinement.rms_sigma * refinement.rms_sigma);
   Mat6 h = scale.asDiagonal() * Mat6(refinement.information) * scale.asDiagonal();
   Mat6 keep = Mat6::Identity();
   for (const Vector6& f : free_directions_about_center(part, instance.camera_from_part)) {

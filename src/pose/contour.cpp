@@ -1,0 +1,129 @@
+#include "tribin/pose/contour.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+
+namespace tribin {
+namespace {
+
+// A hard edge between two pixel centres is uniform within one pixel: sd 0.29 px; mixed pixels and the mesh's facets make it
+// about 0.5 px. Neighbouring samples share their pixel's error: their equations count half.
+constexpr double kEdgeSigmaPx = 0.5;
+constexpr double kSampleWeight = 0.5;
+constexpr double kSteepest = 0.42;  // cos 65 deg
+
+/// Is the scan at pixel (x, y) the plane n . p = rho, up to noise and a pixel's slope?
+bool on_surface(const SceneDepth& scene, double x, double y, const Eigen::Vector3d& n, double rho) {
+  const int u = static_cast<int>(std::lround(x)), v = static_cast<int>(std::lround(y));
+  if (!scene.z_mm.contains(u, v)) return false;
+  const float z = scene.z_mm(u, v);
+  if (!(z > 0)) return false;
+  const Eigen::Vector3d ray = scene.camera.ray(u, v);
+  const double slant = std::abs(n.dot(ray));
+  const double r = n.dot(ray) * z - rho;
+  return std::abs(r) < 6 * scene.sigma_mm(u, v) * slant + z / scene.camera.fx;
+}
+
+/// Signed place of the scan's edge along m from (x, y) [px], nearest to 0; NaN if there is none within reach.
+double edge_along(const SceneDepth& scene, double x, double y, const Vec2& m, const Eigen::Vector3d& n, double rho,
+                  double reach) {
+  const int half = static_cast<int>(std::ceil(reach)) + 2;
+  std::array<bool, 64> on{};
+  const int count = std::min(2 * half + 1, static_cast<int>(on.size()));
+  for (int k = 0; k < count; ++k) {
+    const double s = k - half;
+    on[static_cast<std::size_t>(k)] = on_surface(scene, x + s * m[0], y + s * m[1], n, rho);
+  }
+  double best = std::nan("");
+  for (std::size_t k = 1; k + 2 < static_cast<std::size_t>(count); ++k) {
+    // Two on, two off: a single stray pixel is no edge.
+    if (!(on[k - 1] && on[k] && !on[k + 1] && !on[k + 2])) continue;
+    const double s = static_cast<double>(k) - half + 0.5;
+    if (std::abs(s) <= reach && !(std::abs(s) >= std::abs(best))) best = s;
+  }
+  return best;
+}
+
+}  // namespace
+
+ContourSums contour_sums(const RenderMesh& mesh, const SceneDepth& scene, const Pose& camera_from_part,
+                         const IndexRender& render, const Vec3& center, double reach_px) {
+  ContourSums out;
+  if (render.width == 0) return out;
+  const PinholeCamera& camera = scene.camera;
+  const Eigen::Matrix3d rotation = camera_from_part.linear();
+  double squares = 0, weights = 0;
+  Eigen::Matrix<double, 6, 6> h = Eigen::Matrix<double, 6, 6>::Zero();
+  Eigen::Matrix<double, 6, 1> b = Eigen::Matrix<double, 6, 1>::Zero();
+  const auto faces_camera = [&](std::int32_t t, const Eigen::Vector3d& at) {
+    return t >= 0 && (rotation * mesh.normals[static_cast<std::size_t>(t)].cast<double>()).dot(at) < 0;
+  };
+  for (const MeshEdge& edge : mesh.edges) {
+    const Eigen::Vector3d p0 = camera_from_part * mesh.vertices[edge.vertices[0]].cast<double>();
+    const Eigen::Vector3d p1 = camera_from_part * mesh.vertices[edge.vertices[1]].cast<double>();
+    if (p0.z() <= 1 || p1.z() <= 1) continue;
+    const bool front0 = faces_camera(edge.triangles[0], p0), front1 = faces_camera(edge.triangles[1], p0);
+    if (front0 == front1) continue;
+    const auto seen = static_cast<std::size_t>(edge.triangles[front0 ? 0 : 1]);
+    const Eigen::Vector3d n = rotation * mesh.normals[seen].cast<double>();
+    const double rho = n.dot(p0);
+    if (-rho / p0.norm() < kSteepest) continue;
+    const Vec2 a = camera.project(Vec3(p0)), e = camera.project(Vec3(p1));
+    Vec2 along = e - a;
+    const double length = along.norm();
+    if (length < 1e-6) continue;
+    along /= length;
+    Vec2 m(along[1], -along[0]);
+    // Outward: away from the seen facet's third vertex.
+    for (const std::uint32_t k : mesh.triangles[seen]) {
+      if (k == edge.vertices[0] || k == edge.vertices[1]) continue;
+      const Vec2 third = camera.project(Vec3(camera_from_part * mesh.vertices[k].cast<double>()));
+      if (m.dot(third - a) > 0) m = -m;
+    }
+    // Samples a rendered pixel apart, at least one an edge; short edges count by their length.
+    const int count = std::max(1, static_cast<int>(length / render.step));
+    const double weight = kSampleWeight * length / count;
+    for (int k = 0; k < count; ++k) {
+      const double f = (k + 0.5) / count;
+      // Perspective: equal steps on the screen.
+      const double w = (1 - f) / p0.z() + f / p1.z();
+      const Vec2 q = a + along * (f * length);
+      const double z = 1 / w;
+      // Seen there, and nothing of the part beyond?
+      const auto rendered = [&](double s, float& inverse_z) {
+        const long i = std::lround((q[0] + s * m[0] - render.u0) / render.step);
+        const long j = std::lround((q[1] + s * m[1] - render.v0) / render.step);
+        if (i < 0 || j < 0 || i >= render.width || j >= render.height) return false;
+        const std::size_t at = render.index(static_cast<int>(i), static_cast<int>(j));
+        inverse_z = render.inverse_z[at];
+        return render.triangle[at] >= 0;
+      };
+      float inside = 0, outside = 0;
+      const double margin = 1.2 * render.step;
+      if (!rendered(-margin, inside) || std::abs(1 / inside - z) > 0.01 * z) continue;
+      if (rendered(margin, outside) && 1 / outside - z < 0.01 * z) continue;
+      const double s = edge_along(scene, q[0], q[1], m, n, rho, reach_px);
+      if (!(std::abs(s) <= reach_px)) continue;
+      const Eigen::Vector3d point = Eigen::Vector3d(camera.point(q[0], q[1], z));
+      const Eigen::Vector3d g(m[0] * camera.fx * w, m[1] * camera.fy * w,
+                              -(m[0] * camera.fx * point.x() + m[1] * camera.fy * point.y()) * w * w);
+      Eigen::Matrix<double, 6, 1> jac;
+      jac << g, (point - Eigen::Vector3d(center)).cross(g);
+      const double robust = 1 / (1 + s * s);  // Cauchy with a scale of two edge sigmas
+      const double wt = weight * robust / (kEdgeSigmaPx * kEdgeSigmaPx);
+      h += wt * jac * jac.transpose();
+      b += wt * jac * s;
+      squares += weight * robust * s * s;
+      weights += weight * robust;
+      ++out.samples;
+    }
+  }
+  out.information = h;
+  out.pull = b;
+  out.rms_px = weights > 0 ? std::sqrt(squares / weights) : 0;
+  return out;
+}
+
+}  // namespace tribin
