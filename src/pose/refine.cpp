@@ -130,30 +130,26 @@ Vec6 solve(const System& s) {
   return x;
 }
 
-// Outlines are found to a few tenths of a pixel, systematic parts of it (mixed pixels) included: a direction that the surface holds
-// better than a tenth of a pixel's pitch gains nothing from them.
-constexpr double kWeakPitches = 0.1;
+// Mixed pixels and the raster shift whole outlines by about a tenth of a pixel, which no number of samples averages away: an outline
+// holds no direction better than that, at the end. Before, it may pull with all its weight, so that it carries the pose over the
+// local minima of surfaces that say little.
+constexpr double kOutlineBiasPx = 0.1;
 constexpr double kEdgeReachPx = 6;
 
-/// Adds the outline's equations along the directions that the surface holds worse than `limit_mm`; returns how many there are.
-int hold_weak_directions(Matrix6& information, Vector6& b, const ContourSums& edges, const std::vector<Vector6>& frozen,
-                         const Vec6& scale, double limit_mm) {
+/// Adds the outline's equations; returns in how many directions they say more than the surface.
+int add_outlines(Matrix6& information, Vector6& b, const ContourSums& edges, const std::vector<Vector6>& frozen,
+                 const Vec6& scale, double bias_mm) {
   if (edges.samples < 12) return 0;
+  const System outline = scaled(edges.information, edges.pull, frozen, scale);
+  const Eigen::SelfAdjointEigenSolver<Mat6> eigen(outline.h);
+  const double share = bias_mm > 0 ? std::min(1.0, 1 / (eigen.eigenvalues()(5) * bias_mm * bias_mm)) : 1.0;
   const System surface = scaled(information, b, frozen, scale);
-  const Eigen::SelfAdjointEigenSolver<Mat6> eigen(surface.h);
-  Mat6 weak = Mat6::Zero();
+  const Eigen::GeneralizedSelfAdjointEigenSolver<Mat6> compared(outline.h * share,
+                                                                surface.h + Mat6::Identity() * 1e-9 * surface.h.trace());
   int count = 0;
-  for (int k = 0; k < 6; ++k) {
-    if (eigen.eigenvalues()(k) * limit_mm * limit_mm > 1) continue;
-    weak += eigen.eigenvectors().col(k) * eigen.eigenvectors().col(k).transpose();
-    ++count;
-  }
-  if (count == 0) return 0;
-  const Mat6 s = scale.asDiagonal(), inverse = scale.cwiseInverse().asDiagonal();
-  const Mat6 h = weak * (s * Mat6(edges.information) * s) * weak;
-  const Vec6 pull = weak * (s * Vec6(edges.pull));
-  information += Matrix6(inverse * h * inverse);
-  b += Vector6(inverse * pull);
+  for (int k = 0; k < 6; ++k) count += compared.eigenvalues()(k) > 1;
+  information += edges.information * share;
+  b += edges.pull * share;
   return count;
 }
 
@@ -187,8 +183,9 @@ Refinement refine_pose(const RenderMesh& mesh, const SceneDepth& scene, const Po
     for (int a = 0; a < 6; ++a) b[a] = sums.b[static_cast<std::size_t>(a)] * independent;
     if (options.outlines) {
       const ContourSums edges = contour_sums(mesh, scene, out.camera_from_part, render, Vec3(center), kEdgeReachPx);
-      out.weak_by_surface = hold_weak_directions(out.information, b, edges, options.frozen, scale6,
-                                                 center.z() / scene.camera.fx * kWeakPitches);
+      const bool settling = it + 2 < options.iterations;
+      out.weak_by_surface = add_outlines(out.information, b, edges, options.frozen, scale6,
+                                         settling ? 0 : kOutlineBiasPx * center.z() / scene.camera.fx);
     }
     if (final_pass) break;
     const Vec6 step = scale6.cwiseProduct(solve(scaled(out.information, b, options.frozen, scale6)));

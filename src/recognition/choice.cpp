@@ -140,8 +140,9 @@ Polished polish(const SceneDepth& scene, std::span<const Part> parts, const Cand
   for (const std::size_t k : keep) finalists.emplace_back(&part, poses[k]);
   parallel_each(static_cast<int>(finalists.size()), [&](int i) {
     auto& f = finalists[static_cast<std::size_t>(i)];
-    f.second = refine_pose(part.render_mesh, scene, f.second, refine_options(part, fine, 4, std::max(0.004 * part.diameter_mm, noise)))
-                   .camera_from_part;
+    RefineOptions options = refine_options(part, fine, 6, std::max(0.012 * part.diameter_mm, noise));
+    options.outlines = true;
+    f.second = refine_pose(part.render_mesh, scene, f.second, options).camera_from_part;
   });
   const std::vector<double> likelihood = log_likelihoods(scene, finalists, fine);
   std::vector<std::size_t> order(finalists.size());

@@ -14,7 +14,7 @@ struct RefineOptions {
   std::vector<Vector6> frozen;  ///< directions (mm, rad about `center`) that must not move: free by symmetry, or weak
   Vec3 center = Vec3::Zero();   ///< part frame; rotations turn about it (the box centre)
   double lever_mm = 1;          ///< length that turns radians into mm when directions are compared (radius of gyration)
-  bool outlines = false;        ///< depth edges hold the directions that the surface leaves weak
+  bool outlines = false;        ///< the part's outline pulls towards depth edges, in true units
   double cad_sigma_mm = 0;      ///< how far the part may be from its CAD (chord error, casting)
 };
 
@@ -22,7 +22,7 @@ struct Refinement {
   Pose camera_from_part = Pose::Identity();
   /// Of (dt in mm, w in rad about the centre), camera axes: pixels (noise correlation and step counted) and outlines.
   Matrix6 information = Matrix6::Zero();
-  int weak_by_surface = 0;                ///< directions that the outlines held
+  int weak_by_surface = 0;                ///< directions that the outlines hold better than the surface
   int pixels = 0;                         ///< that hold the pose
   double rms_mm = 0;                      ///< of their residuals along the surface normal
   double rms_sigma = 0;                   ///< the same in units of the local sigma
