@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <numeric>
 
 #include "tribin/core/parallel.hpp"
 #include "tribin/pose/look_up.hpp"
@@ -13,12 +14,36 @@ namespace {
 // Pixels that a polished pose is fitted and compared on: enough for 0.1 sigma of any mean, a few ms a pose.
 constexpr double kPolishPixels = 6000;
 constexpr double kCompareFew = 1500;
+// Poses that a comparison leaves within so many nats are compared again on all pixels.
+constexpr double kDecidePixels = 40000;
+constexpr double kUndecided = 30;
 
 /// Poses that the part's own shape confuses with this one: its self-similar poses and discrete symmetries left out.
 std::vector<Pose> rivals(const Part& part, const Pose& pose) {
   std::vector<Pose> out;
   for (const SelfSimilarPose& s : part.self_similar) out.push_back(pose * s.part_from_part);
   return out;
+}
+
+struct Finalist {
+  Pose pose = Pose::Identity();
+  double log_likelihood = 0;
+};
+
+/// Refines every pose at a render step and sorts them by likelihood, best first.
+void compare(const SceneDepth& scene, const Part& part, int step, std::vector<Finalist>& finalists) {
+  RefineOptions options = refine_options(part, step, 6, std::max(0.012 * part.diameter_mm, 4 * scene.median_sigma_mm));
+  options.outlines = true;
+  parallel_each(static_cast<int>(finalists.size()), [&](int i) {
+    Finalist& f = finalists[static_cast<std::size_t>(i)];
+    f.pose = refine_pose(part.render_mesh, scene, f.pose, options).camera_from_part;
+  });
+  std::vector<std::pair<const Part*, Pose>> poses;
+  for (const Finalist& f : finalists) poses.emplace_back(&part, f.pose);
+  const std::vector<double> likelihood = log_likelihoods(scene, poses, step);
+  for (std::size_t i = 0; i < finalists.size(); ++i) finalists[i].log_likelihood = likelihood[i];
+  std::stable_sort(finalists.begin(), finalists.end(),
+                   [](const Finalist& a, const Finalist& b) { return a.log_likelihood > b.log_likelihood; });
 }
 
 }  // namespace
@@ -113,7 +138,6 @@ Polished polish(const SceneDepth& scene, std::span<const Part> parts, const Cand
   const Part& part = parts[static_cast<std::size_t>(candidate.part)];
   const double noise = 4 * scene.median_sigma_mm;
   const int few = step_for(part, scene, candidate.camera_from_part, kCompareFew);
-  const int fine = step_for(part, scene, candidate.camera_from_part, kPolishPixels);
 
   // Coarse: every rival is settled on few pixels; only those near the best are worth more.
   std::vector<Pose> poses = rivals(part, candidate.camera_from_part);
@@ -135,32 +159,24 @@ Polished polish(const SceneDepth& scene, std::span<const Part> parts, const Cand
   std::stable_sort(keep.begin(), keep.end(), [&](std::size_t a, std::size_t b) { return checks[a].gain > checks[b].gain; });
   if (keep.size() > 8) keep.resize(8);
 
-  // Fine: the survivors on more pixels, compared by likelihood.
-  std::vector<std::pair<const Part*, Pose>> finalists;
-  for (const std::size_t k : keep) finalists.emplace_back(&part, poses[k]);
-  parallel_each(static_cast<int>(finalists.size()), [&](int i) {
-    auto& f = finalists[static_cast<std::size_t>(i)];
-    RefineOptions options = refine_options(part, fine, 6, std::max(0.012 * part.diameter_mm, noise));
-    options.outlines = true;
-    f.second = refine_pose(part.render_mesh, scene, f.second, options).camera_from_part;
-  });
-  const std::vector<double> likelihood = log_likelihoods(scene, finalists, fine);
-  std::vector<std::size_t> order(finalists.size());
-  for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
-  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return likelihood[a] > likelihood[b]; });
+  // Fine: the survivors on more pixels, compared by likelihood; those that stay near the best once more on all pixels.
+  std::vector<Finalist> finalists;
+  for (const std::size_t k : keep) finalists.push_back({poses[k], 0});
+  const int fine = step_for(part, scene, candidate.camera_from_part, kPolishPixels);
+  compare(scene, part, fine, finalists);
+  std::erase_if(finalists, [best = finalists[0].log_likelihood](const Finalist& f) { return f.log_likelihood < best - kUndecided; });
+  if (finalists.size() > 1) compare(scene, part, step_for(part, scene, candidate.camera_from_part, kDecidePixels), finalists);
 
   Polished out;
   out.candidate = candidate;
-  out.candidate.camera_from_part = finalists[order[0]].second;
-  out.candidate.verification = verify_pose(part.render_mesh, scene, out.candidate.camera_from_part,
-                                           verification_options(part, fine, 0.002 * part.diameter_mm));
-  out.log_likelihood = likelihood[order[0]];
+  out.candidate.camera_from_part = finalists[0].pose;
+  out.candidate.verification =
+      verify_pose(part.render_mesh, scene, finalists[0].pose, verification_options(part, fine, 0.002 * part.diameter_mm));
+  out.log_likelihood = finalists[0].log_likelihood;
   out.mask = mask_of(part, scene, out.candidate);
-  for (std::size_t i = 1; i < order.size(); ++i) {
-    const Pose& other = finalists[order[i]].second;
-    if (!close_poses(part, other, out.candidate.camera_from_part, 0.02 * part.diameter_mm, 4 * kDegree))
-      out.others.emplace_back(other, likelihood[order[i]]);
-  }
+  for (const Finalist& f : finalists)
+    if (!close_poses(part, f.pose, finalists[0].pose, 0.02 * part.diameter_mm, 4 * kDegree))
+      out.others.emplace_back(f.pose, f.log_likelihood);
   return out;
 }
 
