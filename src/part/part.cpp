@@ -34,6 +34,39 @@ double largest_distance(const std::vector<Vec3f>& vertices) {
   return best;
 }
 
+/// Axes about which two or more self-similar turns go: the part is nearly round there, and every spin is worth a look.
+std::vector<ContinuousSymmetry> nearly_round_axes(const Part& part) {
+  constexpr double kOverlap = 0.85;  // less in place, and the listed turns are apart from each other
+  struct Axis {
+    ContinuousSymmetry line;
+    int turns = 0;
+  };
+  std::vector<Axis> axes;
+  for (const SelfSimilarPose& s : part.self_similar) {
+    if (s.overlap < kOverlap) continue;
+    const Eigen::AngleAxisd turn{Eigen::Matrix3d(s.part_from_part.linear())};
+    // The fixed point nearest to the box centre: (I - R) p = t, solved across the axis.
+    const Eigen::Matrix3d m = Eigen::Matrix3d::Identity() - s.part_from_part.linear() + turn.axis() * turn.axis().transpose();
+    const Eigen::Vector3d c = part.box_center();
+    const Eigen::Vector3d t = s.part_from_part.translation();
+    Eigen::Vector3d p = m.fullPivLu().solve(t - turn.axis() * turn.axis().dot(t));
+    p += turn.axis() * turn.axis().dot(c - p);
+    bool known = false;
+    for (Axis& a : axes) {
+      const Eigen::Vector3d off = p - Eigen::Vector3d(a.line.point);
+      if (std::abs(turn.axis().dot(Eigen::Vector3d(a.line.axis))) < std::cos(3 * kDegree) || off.norm() > 0.03 * part.diameter_mm)
+        continue;
+      ++a.turns;
+      known = true;
+    }
+    if (!known) axes.push_back({{Vec3(turn.axis()), Vec3(p)}, 1});
+  }
+  std::vector<ContinuousSymmetry> out;
+  for (const Axis& a : axes)
+    if (a.turns >= 2) out.push_back(a.line);
+  return out;
+}
+
 }  // namespace
 
 Part compile_part(const Mesh& mesh, const PartOptions& options) {
@@ -67,6 +100,7 @@ Part compile_part(const Mesh& mesh, const PartOptions& options) {
   SymmetryResult symmetry = find_symmetries(part.mesh);
   part.symmetry = std::move(symmetry.group);
   part.self_similar = std::move(symmetry.self_similar);
+  part.nearly_round = nearly_round_axes(part);
   part.warnings = mesh.warnings;
   return part;
 }

@@ -16,12 +16,6 @@ struct Scored {
   std::size_t order = 0;
 };
 
-const PartView& view_of(const Part& part, const Pose& camera_from_part) {
-  const Eigen::Vector3d center = camera_from_part * Eigen::Vector3d(part.box_center());
-  const Eigen::Vector3d direction = -(camera_from_part.linear().transpose() * center).normalized();
-  return nearest_view(part, Vec3(direction));
-}
-
 bool better(const Scored& a, const Scored& b) { return a.score != b.score ? a.score > b.score : a.order < b.order; }
 
 /// The best of each neighbourhood, at most `most`.
@@ -96,6 +90,12 @@ std::vector<Scored> settle(const SceneDepth& scene, const Part& part, std::vecto
 }
 
 }  // namespace
+
+const PartView& view_of(const Part& part, const Pose& camera_from_part) {
+  const Eigen::Vector3d center = camera_from_part * Eigen::Vector3d(part.box_center());
+  const Eigen::Vector3d direction = -(camera_from_part.linear().transpose() * center).normalized();
+  return nearest_view(part, Vec3(direction));
+}
 
 bool close_poses(const Part& part, const Pose& a, const Pose& b, double distance_mm, double angle) {
   const Eigen::Vector3d c = part.box_center();

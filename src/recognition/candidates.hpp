@@ -16,6 +16,9 @@ struct Candidate {
   Verification verification;
 };
 
+/// The part's view that the camera has of it at a pose.
+const PartView& view_of(const Part& part, const Pose& camera_from_part);
+
 /// How many pixels the part covers at most, at the depth of a pose.
 double covered_pixels(const Part& part, const SceneDepth& scene, const Pose& camera_from_part);
 /// Render step that leaves about `pixels` of the part.

@@ -18,10 +18,44 @@ constexpr double kCompareFew = 1500;
 constexpr double kDecidePixels = 40000;
 constexpr double kUndecided = 30;
 
-/// Poses that the part's own shape confuses with this one: its self-similar poses and discrete symmetries left out.
-std::vector<Pose> rivals(const Part& part, const Pose& pose) {
+/// The pose turned about a line of the part.
+Pose turned(const Pose& pose, const ContinuousSymmetry& line, double angle) {
+  Pose turn = Pose::Identity();
+  turn.linear() = Eigen::AngleAxisd(angle, Eigen::Vector3d(line.axis).normalized()).toRotationMatrix();
+  turn.translation() = Eigen::Vector3d(line.point) - turn.linear() * Eigen::Vector3d(line.point);
+  return pose * turn;
+}
+
+/// Spins about the axes that the part is nearly round about: the look-up's local maxima over the whole turn. A search on the
+/// score, because ICP slides past the small features that decide.
+void add_spins(const SceneDepth& scene, const Part& part, const Pose& pose, std::vector<Pose>& out) {
+  constexpr int kSpins = 120;          // 3 deg: a hole of 5 % of the diameter at its rim
+  constexpr std::size_t kBest = 10;
+  const double tolerance = std::max(0.006 * part.diameter_mm, 4 * scene.median_sigma_mm);
+  for (const ContinuousSymmetry& axis : part.nearly_round) {
+    std::vector<double> score(kSpins);
+    for (int k = 0; k < kSpins; ++k) {
+      const Pose p = turned(pose, axis, 2 * kPi * k / kSpins);
+      const PartView& view = view_of(part, p);
+      score[static_cast<std::size_t>(k)] = look_up(scene, p, view.points, view.normals, view.points.size(), tolerance).score();
+    }
+    std::vector<int> maxima;
+    for (int k = 1; k < kSpins; ++k) {
+      const auto at = [&](int i) { return score[static_cast<std::size_t>((i + kSpins) % kSpins)]; };
+      if (at(k) >= at(k - 1) && at(k) > at(k + 1)) maxima.push_back(k);
+    }
+    std::stable_sort(maxima.begin(), maxima.end(),
+                     [&](int a, int b) { return score[static_cast<std::size_t>(a)] > score[static_cast<std::size_t>(b)]; });
+    if (maxima.size() > kBest) maxima.resize(kBest);
+    for (const int k : maxima) out.push_back(turned(pose, axis, 2 * kPi * k / kSpins));
+  }
+}
+
+/// Poses that the part's own shape confuses with this one.
+std::vector<Pose> rivals(const SceneDepth& scene, const Part& part, const Pose& pose) {
   std::vector<Pose> out;
   for (const SelfSimilarPose& s : part.self_similar) out.push_back(pose * s.part_from_part);
+  add_spins(scene, part, pose, out);
   return out;
 }
 
@@ -140,7 +174,7 @@ Polished polish(const SceneDepth& scene, std::span<const Part> parts, const Cand
   const int few = step_for(part, scene, candidate.camera_from_part, kCompareFew);
 
   // Coarse: every rival is settled on few pixels; only those near the best are worth more.
-  std::vector<Pose> poses = rivals(part, candidate.camera_from_part);
+  std::vector<Pose> poses = rivals(scene, part, candidate.camera_from_part);
   poses.insert(poses.begin(), candidate.camera_from_part);
   std::vector<Verification> checks(poses.size());
   parallel_each(static_cast<int>(poses.size()), [&](int i) {

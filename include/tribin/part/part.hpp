@@ -56,6 +56,7 @@ struct Part {
   double gyration_mm = 0;           ///< rms distance of the surface from the box centre: turns radians into mm
   SymmetryGroup symmetry;
   std::vector<SelfSimilarPose> self_similar;
+  std::vector<ContinuousSymmetry> nearly_round;  ///< axes about which turns leave most of the part in place: spins are searched
   std::vector<PartView> views;
   std::vector<std::string> warnings;
 
