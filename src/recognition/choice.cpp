@@ -6,7 +6,6 @@
 #include <numeric>
 
 #include "tribin/core/parallel.hpp"
-#include "tribin/pose/look_up.hpp"
 
 namespace tribin {
 namespace {
@@ -26,19 +25,19 @@ Pose turned(const Pose& pose, const ContinuousSymmetry& line, double angle) {
   return pose * turn;
 }
 
-/// Spins about the axes that the part is nearly round about: the look-up's local maxima over the whole turn. A search on the
+/// Spins about the axes that the part is nearly round about: the best rendered poses over the whole turn. A search on the
 /// score, because ICP slides past the small features that decide.
 void add_spins(const SceneDepth& scene, const Part& part, const Pose& pose, std::vector<Pose>& out) {
   constexpr int kSpins = 120;          // 3 deg: a hole of 5 % of the diameter at its rim
   constexpr std::size_t kBest = 10;
-  const double tolerance = std::max(0.006 * part.diameter_mm, 4 * scene.median_sigma_mm);
+  const VerificationOptions options =
+      verification_options(part, step_for(part, scene, pose, 2 * kCompareFew), 0.004 * part.diameter_mm);
   for (const ContinuousSymmetry& axis : part.nearly_round) {
     std::vector<double> score(kSpins);
-    for (int k = 0; k < kSpins; ++k) {
-      const Pose p = turned(pose, axis, 2 * kPi * k / kSpins);
-      const PartView& view = view_of(part, p);
-      score[static_cast<std::size_t>(k)] = look_up(scene, p, view.points, view.normals, view.points.size(), tolerance).score();
-    }
+    parallel_each(kSpins, [&](int k) {
+      score[static_cast<std::size_t>(k)] =
+          verify_pose(part.render_mesh, scene, turned(pose, axis, 2 * kPi * k / kSpins), options).gain;
+    });
     std::vector<int> maxima;
     for (int k = 1; k < kSpins; ++k) {
       const auto at = [&](int i) { return score[static_cast<std::size_t>((i + kSpins) % kSpins)]; };
