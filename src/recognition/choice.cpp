@@ -29,9 +29,9 @@ Pose turned(const Pose& pose, const ContinuousSymmetry& line, double angle) {
 /// score, because ICP slides past the small features that decide.
 void add_spins(const SceneDepth& scene, const Part& part, const Pose& pose, std::vector<Pose>& out) {
   constexpr int kSpins = 120;          // 3 deg: a hole of 5 % of the diameter at its rim
-  constexpr std::size_t kBest = 10;
+  constexpr std::size_t kBest = 6;
   const VerificationOptions options =
-      verification_options(part, step_for(part, scene, pose, 2 * kCompareFew), 0.004 * part.diameter_mm);
+      verification_options(part, step_for(part, scene, pose, kPolishPixels), 0.002 * part.diameter_mm);
   for (const ContinuousSymmetry& axis : part.nearly_round) {
     std::vector<double> score(kSpins);
     parallel_each(kSpins, [&](int k) {
@@ -190,7 +190,7 @@ Polished polish(const SceneDepth& scene, std::span<const Part> parts, const Cand
   for (std::size_t k = 0; k < poses.size(); ++k)
     if (k == 0 || checks[k].gain > 0.7 * best) keep.push_back(k);
   std::stable_sort(keep.begin(), keep.end(), [&](std::size_t a, std::size_t b) { return checks[a].gain > checks[b].gain; });
-  if (keep.size() > 8) keep.resize(8);
+  if (keep.size() > 12) keep.resize(12);
 
   // Fine: the survivors on more pixels, compared by likelihood; those that stay near the best once more on all pixels.
   std::vector<Finalist> finalists;
