@@ -235,6 +235,28 @@ Fit fit_plane(const Surfels& surfels, std::span<const std::uint32_t> support) {
   return fit;
 }
 
+double curvature_bound(const Surfels& surfels, std::span<const std::uint32_t> support, const Fit& plane) {
+  Vec3 u, v;
+  orthonormal_basis(plane.surface.axis, u, v);
+  Square h = Square::Zero();
+  Column g = Column::Zero();
+  for (std::uint32_t i : support) {
+    const Vec3 q = surfels.position[i].cast<double>() - plane.surface.point;
+    const double x = q.dot(u), y = q.dot(v);
+    const double weight = 1.0 / std::pow(surfels.sigma_mm[i] * plane.scale, 2);
+    Column row;
+    row << 1, x, y, 0.5 * x * x, x * y, 0.5 * y * y;
+    h += weight * row * row.transpose();
+    g += weight * row * plane.surface.axis.dot(q);
+  }
+  const Eigen::LDLT<Square> solver(h);
+  if (solver.info() != Eigen::Success || solver.vectorD().minCoeff() <= 0) return 1e30;
+  const Column c = solver.solve(g);
+  const Square covariance = correlation_inflation(surfels) * solver.solve(Square::Identity());
+  const double middle = 0.5 * (c[3] + c[5]), half = std::sqrt(0.25 * (c[3] - c[5]) * (c[3] - c[5]) + c[4] * c[4]);
+  return std::abs(middle) + half + 2.0 * std::sqrt(std::max(covariance(3, 3), covariance(5, 5)));
+}
+
 Fit fit_round(const Surfels& surfels, std::span<const std::uint32_t> support, const Surface& start,
               const FitOptions& options) {
   Fit fit;

@@ -51,6 +51,10 @@ struct FitOptions {
 /// Least squares of a plane to the surfels' positions, robust, weights 1 / sigma^2.
 Fit fit_plane(const Surfels& surfels, std::span<const std::uint32_t> support);
 
+/// The largest curvature [1/mm] that the residuals about a plane could hide: |kappa| + 2 sd of the steepest direction
+/// of a quadric fitted to them; infinite where the support is too small to say.
+double curvature_bound(const Surfels& surfels, std::span<const std::uint32_t> support, const Fit& plane);
+
 /// Levenberg-Marquardt on geometric distances to a cylinder, cone or sphere with a Geman-McClure kernel that shrinks
 /// from `start_mm` to the noise. \param start  a surface near the solution.
 Fit fit_round(const Surfels& surfels, std::span<const std::uint32_t> support, const Surface& start,

@@ -16,7 +16,7 @@ struct Binned {
   std::vector<std::int32_t> bin_of;  ///< per surfel, -1 = votes not
 };
 
-Binned bin_flat(const Scene& scene, const DirectionBins& bins, std::vector<float>& votes) {
+Binned bin_normals(const Scene& scene, PlaneVoters voters, const DirectionBins& bins, std::vector<float>& votes) {
   const Surfels& s = scene.surfels;
   Binned out;
   std::vector<std::int32_t>& bin_of = out.bin_of;
@@ -24,7 +24,9 @@ Binned bin_flat(const Scene& scene, const DirectionBins& bins, std::vector<float
   out.begin.assign(bins.center.size() + 1, 0);
   votes.assign(bins.center.size(), 0.0f);
   for (std::uint32_t i = 0; i < s.size(); ++i) {
-    if (!scene.free(i) || s.shape[i] != SurfelShape::flat) continue;
+    if (!scene.free(i)) continue;
+    const bool undecided = s.shape[i] == SurfelShape::unknown && voters == PlaneVoters::flat_and_undecided;
+    if (s.shape[i] != SurfelShape::flat && !undecided) continue;
     bin_of[i] = bins.find(s.normal[i]);
     votes[bin_of[i]] += s.area_mm2[i];
     ++out.begin[bin_of[i] + 1];
@@ -44,7 +46,7 @@ Indices seed_of(const Surfels& s, const Indices& component) {
                             [&](std::uint32_t a, std::uint32_t b) { return s.area_mm2[a] < s.area_mm2[b]; })};
 }
 
-std::optional<Found> explain_plane(Scene& scene, const Indices& whole, const Limits& limits) {
+std::optional<Found> explain_plane(Scene& scene, const Indices& whole, PlaneVoters voters, const Limits& limits) {
   const Indices component = seed_of(scene.surfels, whole);
   Fit fit = fit_plane(scene.surfels, component);
   if (!fit.valid) return std::nullopt;
@@ -59,6 +61,9 @@ std::optional<Found> explain_plane(Scene& scene, const Indices& whole, const Lim
   if (scene.surfels.mesh == nullptr && std::sqrt(fit.covariance.topLeftCorner<2, 2>().trace()) > 3.0 * kDegree)
     return std::nullopt;
   if (area_of(scene.surfels, out.support) < limits.min_area_mm2) return std::nullopt;
+  if (voters == PlaneVoters::flat_and_undecided &&
+      curvature_bound(scene.surfels, out.support, fit) > 0.7 / scene.surfels.max_radius_mm)
+    return std::nullopt;
   out.fit = fit;
   return out;
 }
@@ -71,11 +76,12 @@ void take(Scene& scene, std::vector<Found>& found, Found&& next) {
   found.push_back(std::move(next));
 }
 
-void find_planes(Scene& scene, const Limits& limits, HoughSpaces& spaces, std::vector<Found>& found) {
+void find_planes(Scene& scene, const Limits& limits, PlaneVoters voters, HoughSpaces& spaces,
+                 std::vector<Found>& found) {
   const Surfels& s = scene.surfels;
   const DirectionBins& bins = ijk_bins();
   std::vector<float> votes;
-  const Binned binned = bin_flat(scene, bins, votes);
+  const Binned binned = bin_normals(scene, voters, bins, votes);
   std::vector<float> smooth(votes.size(), 0.0f);
   const auto smooth_at = [&](std::size_t b) {
     float sum = 0;
@@ -128,7 +134,7 @@ void find_planes(Scene& scene, const Limits& limits, HoughSpaces& spaces, std::v
         for (;;) {  // a component may hold several planes a few degrees apart
           std::erase_if(left, [&](std::uint32_t i) { return !scene.free(i); });
           if (left.size() < least) break;
-          std::optional<Found> plane = explain_plane(scene, left, limits);
+          std::optional<Found> plane = explain_plane(scene, left, voters, limits);
           if (!plane) break;
           plane->peak = peak_index;
           any = true;

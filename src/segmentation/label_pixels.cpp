@@ -10,6 +10,8 @@ namespace {
 
 using namespace segmentation_detail;
 
+constexpr int kReach = 2;  // cells: a cell at an edge is refused, and so may be the one beside it
+
 Surface surface_of(const Primitive& p) {
   Surface s;
   s.type = p.type;
@@ -41,13 +43,13 @@ Image<std::uint16_t> label_pixels(const Primitives& primitives, const Surfels& s
         if (!std::isfinite(scan.z_mm(u, v))) continue;
         const int column = u / n, row = v / n;
         // The own cell first; pixels of refused cells (edges) may belong to a neighbouring cell's primitive.
-        int candidates[9], count = 0;
+        int candidates[(2 * kReach + 1) * (2 * kReach + 1)], count = 0;
         const int own = label_of_cell(column, row);
         if (own > 0) candidates[count++] = own;
         const bool refused = !cells.contains(column, row) || cells(column, row) < 0;
         if (refused || own == 0)
-          for (int dv = -1; dv <= 1; ++dv)
-            for (int du = -1; du <= 1; ++du) {
+          for (int dv = -kReach; dv <= kReach; ++dv)
+            for (int du = -kReach; du <= kReach; ++du) {
               const int label = label_of_cell(column + du, row + dv);
               if (label > 0 && std::find(candidates, candidates + count, label) == candidates + count)
                 candidates[count++] = label;
@@ -56,12 +58,15 @@ Image<std::uint16_t> label_pixels(const Primitives& primitives, const Surfels& s
         const int tile_u = std::min(column / 8, surfels.local_sigma_mm.width - 1);
         const int tile_v = std::min(row / 8, surfels.local_sigma_mm.height - 1);
         const Vec3 p = scan.point(u, v);
-        double best = 3.0 * surfels.local_sigma_mm(tile_u, tile_v);
+        const double noise = 3.0 * surfels.local_sigma_mm(tile_u, tile_v);
+        double best = 1e300;
         for (int k = 0; k < count; ++k) {
           const Surface& s = surfaces[static_cast<std::size_t>(candidates[k] - 1)];
+          // Where the sensor's waves exceed its noise, the support's own scatter says how far its pixels lie.
+          const double waves = 3.0 * primitives.items[static_cast<std::size_t>(candidates[k] - 1)].rms_mm;
           // Along the ray the noise is sigma; along the normal it is seen at its cosine.
           const double distance = std::abs(s.distance(p)) / std::max(0.2, std::abs(s.normal(p).dot(p)) / p.z());
-          if (distance > best) continue;
+          if (distance > std::min(best, std::sqrt(noise * noise + waves * waves))) continue;
           best = distance;
           labels(u, v) = static_cast<std::uint16_t>(candidates[k]);
         }

@@ -119,14 +119,17 @@ Primitives segment(const Surfels& surfels, const SegmentationOptions& options) {
   if (surfels.mesh != nullptr) take_cad_faces(scene, found);
 
   // Back and forth among the spaces on what is left, until a round explains nothing more.
-  constexpr int kRounds = 3;
+  constexpr int kRounds = 2;
   for (int round = 0; round < kRounds; ++round) {
     const std::size_t before = found.size();
-    find_planes(scene, limits, out.spaces, found);
+    find_planes(scene, limits, PlaneVoters::flat, out.spaces, found);
     // Flat cones of a CAD file would pass as cylinders of large radius; exact vertices let cones go first.
     if (surfels.mesh != nullptr) find_cones_and_spheres(scene, limits, found);
     find_cylinders(scene, limits, out.spaces, found);
-    find_cones_and_spheres(scene, limits, found);
+    if (surfels.mesh == nullptr) {
+      find_planes(scene, limits, PlaneVoters::flat_and_undecided, out.spaces, found);
+      find_cones_and_spheres(scene, limits, found);
+    }
     if (found.size() == before) break;
   }
 

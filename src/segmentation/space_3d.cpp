@@ -8,7 +8,11 @@ namespace {
 
 constexpr double kRoundSlack = 4.0 * kDegree;  // the quadric's gradient on a tight radius, cubic terms
 constexpr double kShortArc = 60.0 * kDegree;   // below, a free radius means little: algorithms.md section 10
-constexpr double kMaxRmsSigma = 3.5;           // rms of cell means in sigmas: right ones 1-1.5, compromises > 4
+// Share of the rim that goes on smoothly: cylinders of the development scans 0-0.28, patches of a plaster bust
+// 0.35-0.8.
+constexpr double kMaxSmoothRim = 0.30;
+constexpr double kSurfelsPerSigma = 28;  // pieces of the bust that end at edges: below 25; cylinders: above 28
+constexpr double kMaxRmsSigma = 3.5;     // rms of cell means in sigmas: right ones 1-1.5, compromises > 4
 
 struct Candidate {
   Fit fit;
@@ -59,7 +63,9 @@ bool accepted(Scene& scene, const Indices& component, const Candidate& c, double
   // A piece cut out of a free-form surface: goes on smoothly past its rim, or leaves waves inside.
   const double rim = smooth_rim_share(scene, c.support);
   const double waves = residual_correlation(scene, c.support, c.fit.surface);
-  if (rim > 0.5 || (rim > 0.3 && waves > 0.5)) return false;
+  if (rim > kMaxSmoothRim || (rim > 0.2 && waves > 0.5)) return false;
+  // The rougher it lies, the more of it must be seen: curls of hair and lettering pass every other test.
+  if (static_cast<double>(c.support.size()) < kSurfelsPerSigma * c.fit.rms_sigma && s.mesh == nullptr) return false;
   return true;
 }
 
@@ -168,11 +174,14 @@ void find_cones_and_spheres(Scene& scene, const Limits& limits, std::vector<Foun
       options.cone = !sphere;
       std::optional<Candidate> c = settle(scene, component, start, options, limits);
       if (!c) continue;
+      if (std::abs(c->fit.surface.half_angle) > 80 * kDegree) continue;  // a dented plane
       const double arc = arc_of(s, c->support, c->fit.surface);
       if (!sphere && !accepted(scene, component, *c, arc, limits)) continue;
-      if (sphere && (area_of(s, c->support) < limits.min_area_mm2 || c->fit.rms_sigma > kMaxRmsSigma ||
-                     2 * kept(scene, component, *c) < component.size() || smooth_rim_share(scene, c->support) > 0.3 ||
-                     std::sqrt(c->fit.covariance(4, 4)) > 0.1 * c->fit.surface.radius))
+      if (sphere &&
+          (area_of(s, c->support) < limits.min_area_mm2 || c->fit.rms_sigma > kMaxRmsSigma ||
+           2 * kept(scene, component, *c) < component.size() || smooth_rim_share(scene, c->support) > kMaxSmoothRim ||
+           c->support.size() < kSurfelsPerSigma * c->fit.rms_sigma ||
+           std::sqrt(c->fit.covariance(4, 4)) > 0.1 * c->fit.surface.radius))
         continue;
       Found out;
       out.fit = c->fit;

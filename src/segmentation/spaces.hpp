@@ -25,8 +25,13 @@ struct Limits {
   double max_radius_mm = 0;  ///< free radii beyond this are not told from planes
 };
 
-/// IJK space: peaks of the flat surfels' normals; in 3-D space their components become planes. Marks what it takes.
-void find_planes(Scene& scene, const Limits& limits, HoughSpaces& spaces, std::vector<Found>& found);
+/// Who votes in IJK space. `undecided` surfels could lie on a large cylinder; a plane of them must prove flat as a
+/// whole.
+enum class PlaneVoters { flat, flat_and_undecided };
+
+/// IJK space: peaks of the surfels' normals; in 3-D space their components become planes. Marks what it takes.
+void find_planes(Scene& scene, const Limits& limits, PlaneVoters voters, HoughSpaces& spaces,
+                 std::vector<Found>& found);
 
 /// Parameter space: peaks of rulings; in 3-D space centres and radii become cylinders, and cones where they taper.
 void find_cylinders(Scene& scene, const Limits& limits, HoughSpaces& spaces, std::vector<Found>& found);

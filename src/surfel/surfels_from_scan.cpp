@@ -340,6 +340,7 @@ Surfels surfels_from_scan(const Scan& scan, const SurfelOptions& options) {
   s.scan = &scan;
   s.cell_px = n;
   s.correlation_px = typical.correlation_px;
+  s.max_radius_mm = options.max_radius_mm;
   s.local_sigma_mm = local_noise(grid, noise, steps);
   const std::vector<float> sigma_d =
       accept_cells(grid, s.local_sigma_mm, noise, 1.0 / std::min(scan.camera.fx, scan.camera.fy));

@@ -40,6 +40,7 @@ struct Surfels {
   std::vector<std::uint32_t> cell;        ///< scan: row-major index of the surfel's cell
   Image<float> local_sigma_mm;            ///< scan: the estimated local noise of z, one value per tile of 8 x 8 cells
   double correlation_px = 0;              ///< scan: used noise correlation
+  float max_radius_mm = 100;              ///< the radius that `flat` was proven against
 
   std::size_t size() const { return position.size(); }
 };
