@@ -224,8 +224,10 @@ PointSet points_from_cloud(const RawCloud& cloud, const ScanReadOptions& options
   const double scale = cloud_unit(cloud, options.unit, set.warnings);
   Vec3f low = Vec3f::Constant(std::numeric_limits<float>::infinity()), high = -low;
   set.points.reserve(cloud.points.size());
+  // Many points at 0 0 0 are holes of a writer without NaN; a single one is a point.
+  const auto zeros = std::count(cloud.points.begin(), cloud.points.end(), Vec3f(0, 0, 0));
   for (const Vec3f& p : cloud.points) {
-    if (is_hole(p)) continue;
+    if (!p.allFinite() || (zeros > 1 && is_hole(p))) continue;
     set.points.push_back(p * static_cast<float>(scale));
     low = low.cwiseMin(set.points.back());
     high = high.cwiseMax(set.points.back());

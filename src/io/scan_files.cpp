@@ -79,10 +79,10 @@ ScanOrPoints read_scan_or_points(const std::filesystem::path& path, const ScanRe
   auto& cloud = std::get<RawCloud>(content);
   if (!cloud.organized()) return io::points_from_cloud(cloud, options);
   try {
-    return io::scan_from_cloud(cloud, options);
+    return io::scan_from_cloud(std::move(cloud), options);
   } catch (const Error& error) {
     if (error.code() != ErrorCode::bad_input) throw;
-    PointSet points = io::points_from_cloud(cloud, options);
+    PointSet points = read_points(path, options);  // read again, which is rare, rather than copied each time
     points.warnings.push_back("the grid is not used: " + std::string(error.what()));
     return points;
   }
