@@ -1,0 +1,246 @@
+#include "tribin/sim/structured_light.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <complex>
+#include <limits>
+
+#include "sim/noise_field.hpp"
+#include "sim/random.hpp"
+#include "sim/ray_scene.hpp"
+#include "tribin/core/error.hpp"
+#include "tribin/core/parallel.hpp"
+
+namespace tribin::sim {
+namespace {
+
+constexpr int kRows = 32;
+constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+
+void check(const StructuredLight& s) {
+  const auto want = [](bool good, const char* what) {
+    if (!good) throw Error(ErrorCode::out_of_range, std::string("simulated sensor: wanted ") + what);
+  };
+  want(s.camera.width > 0 && s.camera.height > 0 && s.camera.fx > 0 && s.camera.fy > 0,
+       "a camera with width, height, fx, fy > 0");
+  want(s.baseline_mm > 0 && s.projector_focal_px > 0 && s.fringe_period_px > 0,
+       "baseline_mm, projector_focal_px, fringe_period_px > 0");
+  want(s.steps >= 3, "steps >= 3");
+  want(s.image_noise >= 0 && s.noise_mm >= 0, "image_noise and noise_mm >= 0");
+  want(s.noise_correlation_px >= 0 && s.noise_correlation_px <= 5, "noise_correlation_px in [0, 5]");
+  want(s.facing_modulation > 0 && s.reference_mm > 0, "facing_modulation and reference_mm > 0");
+}
+
+/// The light that comes back from one point.
+struct Return {
+  double modulation = 0;  ///< grey levels
+  Invalid state = Invalid::nothing_there;
+};
+
+/// sd of z for a facing surface of albedo 0.5 at the reference distance, by the noise law.
+double facing_sigma(const StructuredLight& s) {
+  if (s.noise_mm > 0) return s.noise_mm;
+  return s.reference_mm * s.reference_mm / (s.baseline_mm * s.projector_focal_px) * s.fringe_period_px / (2 * kPi) *
+         std::sqrt(2.0 / s.steps) * s.image_noise / s.facing_modulation;
+}
+
+Return light_of(const RayScene& scene, const StructuredLight& s, const Hit& hit, const Vec3& ray, double albedo) {
+  if (hit.body < 0) return {};
+  const Vec3 point = ray * hit.z, projector(s.baseline_mm, 0, 0);
+  const Vec3 to_light = projector - point;
+  const Vec3 l = to_light.normalized(), e = -ray.normalized();
+  const double cos_light = hit.normal.dot(l), cos_eye = hit.normal.dot(e);
+  if (cos_light <= 0 || scene.occluded(point, projector)) return {0, Invalid::shadow};
+  const double falloff = s.reference_mm / to_light.norm();
+  const double modulation = s.facing_modulation * (albedo / 0.5) * cos_light * falloff * falloff;
+  if (std::min(cos_light, cos_eye) < std::cos(s.max_incidence)) return {modulation, Invalid::grazing};
+  // A lobe about the mirror direction, Blinn's with exponent 200 (machined metal: half width 6 deg), that fills the
+  // camera's range once it adds 1.5 times the diffuse light of a facing surface.
+  const double mirror = std::pow(std::max(0.0, hit.normal.dot((l + e).normalized())), 200);
+  if (s.highlight * mirror * falloff * falloff > 0.45 + 0.1 * (1 - cos_light)) return {modulation, Invalid::saturated};
+  if (modulation < s.min_modulation) return {modulation, Invalid::dark};
+  return {modulation, Invalid::measured};
+}
+
+/// One measured value: depth and modulation.
+struct Measured {
+  double z = 0;
+  Return light;
+};
+
+/// The fringes of several points in one pixel: phasors add, the phase is read near the middle's.
+Measured mixed_pixel(const RayScene& scene, const StructuredLight& s, const std::vector<Body>& bodies, int u, int v,
+                     const Hit& middle, const Return& middle_light) {
+  // The pixel's square by four sub-samples and its middle.
+  constexpr std::array<std::array<double, 2>, 4> kOffsets = {{{-0.3, -0.3}, {0.3, -0.3}, {-0.3, 0.3}, {0.3, 0.3}}};
+  const double scale = 2 * kPi / s.fringe_period_px;
+  const Vec3 ray = s.camera.ray(u, v);
+  // Column of the projector that lights depth z on a ray: f_p (x / z - B / z), with x / z from the ray.
+  const auto column = [&](const Vec3& r, double z) { return s.projector_focal_px * (r.x() - s.baseline_mm / z); };
+  const double at = column(ray, middle.z);
+  std::complex<double> sum = 0;
+  int count = 0;
+  const auto add = [&](double x, const Return& light) {
+    ++count;
+    if (light.state == Invalid::measured || light.state == Invalid::dark || light.state == Invalid::grazing)
+      sum += light.modulation * std::polar(1.0, scale * (x - at));
+  };
+  if (middle.body >= 0) add(at, middle_light);
+  for (const auto& offset : kOffsets) {
+    const Vec3 r = s.camera.ray(u + offset[0], v + offset[1]);
+    const Hit hit = scene.first_hit(r);
+    if (hit.body < 0) {
+      ++count;
+      continue;
+    }
+    // The sub-ray's own place in the image belongs to the pixel's middle: the phase is compared at equal x / z.
+    add(column(r, hit.z) - s.projector_focal_px * (r.x() - ray.x()),
+        light_of(scene, s, hit, r, bodies[hit.body].albedo));
+  }
+  Measured result{middle.z, middle_light};
+  result.light.modulation = std::abs(sum) / count;
+  if (result.light.state != Invalid::measured) return result;
+  if (result.light.modulation < s.min_modulation) {
+    result.light.state = Invalid::dark;
+    return result;
+  }
+  const double x = at + std::arg(sum) / scale;
+  result.z = s.baseline_mm / (ray.x() - x / s.projector_focal_px);
+  return result;
+}
+
+/// Does the surface break between this pixel and a neighbour? `limit` [mm] on the second difference of z.
+bool on_edge(const SimulatedScan& out, int u, int v, double limit) {
+  const int body = out.body(u, v);
+  for (const auto [du, dv] : {std::array{1, 0}, std::array{0, 1}}) {
+    const int a = u - du, b = v - dv, c = u + du, d = v + dv;
+    if (!out.body.contains(a, b) || !out.body.contains(c, d)) continue;
+    if (out.body(a, b) != body || out.body(c, d) != body) return true;
+    if (body >= 0 && std::abs(out.true_z(a, b) - 2 * out.true_z(u, v) + out.true_z(c, d)) > limit) return true;
+  }
+  return false;
+}
+
+/// Silhouette of one body, were it alone.
+void count_silhouette(const Body& body, const PinholeCamera& camera, BodyTruth& truth) {
+  double u0 = 1e9, v0 = 1e9, u1 = -1e9, v1 = -1e9;
+  for (const Vec3f& vertex : body.mesh->vertices) {
+    const Vec3 p = body.camera_from_body * Vec3(vertex.cast<double>());
+    if (p.z() <= 1) return;  // reaches behind the camera: no silhouette to speak of (a table)
+    const Vec2 q = camera.project(p);
+    u0 = std::min(u0, q.x()), u1 = std::max(u1, q.x()), v0 = std::min(v0, q.y()), v1 = std::max(v1, q.y());
+  }
+  const int left = std::clamp(static_cast<int>(std::floor(u0)), 0, camera.width - 1);
+  const int right = std::clamp(static_cast<int>(std::ceil(u1)), 0, camera.width - 1);
+  const int top = std::clamp(static_cast<int>(std::floor(v0)), 0, camera.height - 1);
+  const int bottom = std::clamp(static_cast<int>(std::ceil(v1)), 0, camera.height - 1);
+  const RayScene alone({body});
+  int x0 = camera.width, x1 = -1, y0 = camera.height, y1 = -1;
+  for (int v = top; v <= bottom; ++v)
+    for (int u = left; u <= right; ++u)
+      if (alone.first_hit(camera.ray(u, v)).body >= 0) {
+        ++truth.pixels_all;
+        x0 = std::min(x0, u), x1 = std::max(x1, u), y0 = std::min(y0, v), y1 = std::max(y1, v);
+      }
+  if (x1 >= 0)
+    truth.box_all[0] = x0, truth.box_all[1] = y0, truth.box_all[2] = x1 - x0 + 1, truth.box_all[3] = y1 - y0 + 1;
+}
+
+/// Counts and boxes of what is seen of each body.
+void count_visible(SimulatedScan& out) {
+  for (std::size_t b = 0; b < out.bodies.size(); ++b) {
+    BodyTruth& truth = out.bodies[b];
+    int x0 = out.body.width, x1 = -1, y0 = out.body.height, y1 = -1;
+    for (int v = 0; v < out.body.height; ++v)
+      for (int u = 0; u < out.body.width; ++u) {
+        if (out.body(u, v) != static_cast<int>(b)) continue;
+        ++truth.pixels_visible;
+        truth.pixels_measured += std::isfinite(out.scan.z_mm(u, v));
+        x0 = std::min(x0, u), x1 = std::max(x1, u), y0 = std::min(y0, v), y1 = std::max(y1, v);
+      }
+    if (x1 >= 0)
+      truth.box_visible[0] = x0, truth.box_visible[1] = y0, truth.box_visible[2] = x1 - x0 + 1,
+      truth.box_visible[3] = y1 - y0 + 1;
+  }
+}
+
+}  // namespace
+
+SimulatedScan simulate_scan(const std::vector<Body>& bodies, const StructuredLight& sensor, std::uint64_t seed) {
+  check(sensor);
+  for (const Body& body : bodies) TRIBIN_ASSERT(body.mesh != nullptr);
+  const PinholeCamera& camera = sensor.camera;
+  const int w = camera.width, h = camera.height;
+  SimulatedScan out;
+  out.true_z = Image<float>(w, h, kNaN);
+  out.body = Image<std::int16_t>(w, h, -1);
+  out.face = Image<std::int32_t>(w, h, 0);
+  out.normal = Image<Vec3f>(w, h, Vec3f::Zero());
+  out.sigma_mm = Image<float>(w, h, 0);
+  out.scan.z_mm = Image<float>(w, h, kNaN);
+  out.scan.modulation = Image<std::uint8_t>(w, h, 0);
+  out.scan.invalid_reason = Image<std::uint8_t>(w, h, static_cast<std::uint8_t>(Invalid::nothing_there));
+  out.scan.camera = camera;
+  out.scan.source = "simulated";
+
+  const RayScene scene(bodies);
+  Image<Hit> hits(w, h);
+  parallel_ranges(h, kRows, [&](int begin, int end) {
+    for (int v = begin; v < end; ++v)
+      for (int u = 0; u < w; ++u) {
+        const Hit hit = scene.first_hit(camera.ray(u, v));
+        hits(u, v) = hit;
+        if (hit.body < 0) continue;
+        const Mesh& mesh = *bodies[hit.body].mesh;
+        out.body(u, v) = static_cast<std::int16_t>(hit.body);
+        out.true_z(u, v) = static_cast<float>(hit.z);
+        out.normal(u, v) = hit.normal.cast<float>();
+        out.face(u, v) = mesh.face_of_triangle.empty() ? static_cast<std::int32_t>(hit.triangle) + 1
+                                                       : mesh.face_of_triangle[hit.triangle];
+      }
+  });
+
+  const double sigma0 = facing_sigma(sensor);
+  const Image<float> noise = noise_field(w, h, sensor.noise_correlation_px, seed);
+  // The systematic error: a quadratic over the image with coefficients in [-1, 1], scaled so that it stays below 1.
+  Random random(mixed(seed) ^ 0x5E57E3A71Cu);
+  std::array<double, 6> c{};
+  double sum = 0;
+  for (double& k : c) k = random.uniform(-1, 1), sum += std::abs(k);
+  for (double& k : c) k /= sum;
+
+  parallel_ranges(h, kRows, [&](int begin, int end) {
+    for (int v = begin; v < end; ++v)
+      for (int u = 0; u < w; ++u) {
+        const Hit& hit = hits(u, v);
+        if (hit.body < 0) continue;
+        const Vec3 ray = camera.ray(u, v);
+        Measured m{hit.z, light_of(scene, sensor, hit, ray, bodies[hit.body].albedo)};
+        // A break is more than the noise shows: below it, mixing changes nothing that one could see.
+        if (sensor.mixed_pixels && on_edge(out, u, v, std::max(0.05, 2 * sigma0)))
+          m = mixed_pixel(scene, sensor, bodies, u, v, hit, m.light);
+        out.scan.invalid_reason(u, v) = static_cast<std::uint8_t>(m.light.state);
+        if (m.light.state != Invalid::measured) continue;
+        const double range = m.z / sensor.reference_mm;
+        const double sigma = sigma0 * range * range * sensor.facing_modulation / m.light.modulation;
+        const double x = 2.0 * u / w - 1, y = 2.0 * v / h - 1;
+        const double error =
+            sensor.systematic * (c[0] + c[1] * x + c[2] * y + c[3] * x * x + c[4] * x * y + c[5] * y * y);
+        out.sigma_mm(u, v) = static_cast<float>(sigma);
+        out.scan.modulation(u, v) = static_cast<std::uint8_t>(std::clamp(m.light.modulation, 0.0, 255.0));
+        out.scan.z_mm(u, v) = static_cast<float>(m.z * (1 + error) + sigma * noise(u, v));
+      }
+  });
+
+  for (const Body& body : bodies) {
+    BodyTruth truth;
+    truth.camera_from_body = body.camera_from_body;
+    out.bodies.push_back(truth);
+  }
+  parallel_each(static_cast<int>(bodies.size()), [&](int b) { count_silhouette(bodies[b], camera, out.bodies[b]); });
+  count_visible(out);
+  return out;
+}
+
+}  // namespace tribin::sim
