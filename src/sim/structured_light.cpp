@@ -52,8 +52,11 @@ Return light_of(const RayScene& scene, const StructuredLight& s, const Hit& hit,
   const Vec3 l = to_light.normalized(), e = -ray.normalized();
   const double cos_light = hit.normal.dot(l), cos_eye = hit.normal.dot(e);
   if (cos_light <= 0 || scene.occluded(point, projector)) return {0, Invalid::shadow};
-  const double falloff = s.reference_mm / to_light.norm();
-  const double modulation = s.facing_modulation * (albedo / 0.5) * cos_light * falloff * falloff;
+  // In units of a facing surface on the axis at the reference distance, which the projector meets slightly aslant.
+  const double reference = std::hypot(s.reference_mm, s.baseline_mm);
+  const double falloff = reference / to_light.norm();
+  const double modulation =
+      s.facing_modulation * (albedo / 0.5) * cos_light * (reference / s.reference_mm) * falloff * falloff;
   if (std::min(cos_light, cos_eye) < std::cos(s.max_incidence)) return {modulation, Invalid::grazing};
   // A lobe about the mirror direction, Blinn's with exponent 200 (machined metal: half width 6 deg), that fills the
   // camera's range once it adds 1.5 times the diffuse light of a facing surface.
