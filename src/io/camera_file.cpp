@@ -151,7 +151,7 @@ Image<Vec3f> undistorted_rays(const CameraFile& file) {
   const PinholeCamera& c = file.camera;
   const double k1 = file.distortion[0], k2 = file.distortion[1], p1 = file.distortion[2], p2 = file.distortion[3],
                k3 = file.distortion[4];
-  Image<Vec3f> rays(c.width, c.height);
+  Image<Vec3f> rays(c.width, c.height, Vec3f::Zero());
   parallel_ranges(c.height, 64, [&](int begin, int end) {
     for (int v = begin; v < end; ++v) {
       for (int u = 0; u < c.width; ++u) {
