@@ -2,9 +2,11 @@
 #include <cmath>
 #include <numeric>
 
+#include "segmentation/boundary.hpp"
 #include "segmentation/cad_faces.hpp"
 #include "segmentation/spaces.hpp"
 #include "tribin/core/error.hpp"
+#include "tribin/core/parallel.hpp"
 #include "tribin/segmentation/primitives.hpp"
 
 namespace tribin {
@@ -137,6 +139,13 @@ Primitives segment(const Surfels& surfels, const SegmentationOptions& options) {
   for (Found& f : found) out.items.push_back(primitive_of(surfels, f));
   std::stable_sort(out.items.begin(), out.items.end(),
                    [](const Primitive& a, const Primitive& b) { return a.area_mm2 > b.area_mm2; });
+  if (surfels.scan != nullptr) {
+    parallel_each(static_cast<int>(out.items.size()), [&](int i) {
+      Primitive& p = out.items[static_cast<std::size_t>(i)];
+      if (p.type == PrimitiveType::plane) p.loops = plane_boundaries(p, surfels);
+    });
+    add_common_holes(out.items, surfels);
+  }
   out.label_of_surfel.assign(surfels.size(), 0);
   for (std::size_t i = 0; i < out.items.size(); ++i) {
     out.items[i].id = static_cast<int>(i + 1);
