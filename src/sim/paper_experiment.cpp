@@ -46,8 +46,9 @@ PaperScene paper_scene(const Mesh& part, const std::vector<StableRest>& rests, i
                   part.name + ": too large to be seen whole from " + std::to_string(options.distance_mm) + " mm");
   }
   const Mesh table = table_mesh();
-  result.simulated = simulate_scan({{&table, camera_from_table, 0.5}, {&part, result.camera_from_part, 0.5}}, sensor,
-                                   mixed(static_cast<std::uint64_t>(seed)));
+  result.simulated =
+      simulate_scan({{&table, camera_from_table, 0.5, /*shine=*/0}, {&part, result.camera_from_part, 0.5}}, sensor,
+                    mixed(static_cast<std::uint64_t>(seed)));
   return result;
 }
 

@@ -29,6 +29,7 @@ void check(const StructuredLight& s) {
   want(s.steps >= 3, "steps >= 3");
   want(s.image_noise >= 0 && s.noise_mm >= 0, "image_noise and noise_mm >= 0");
   want(s.noise_correlation_px >= 0 && s.noise_correlation_px <= 5, "noise_correlation_px in [0, 5]");
+  want(s.lost_share >= 0 && s.lost_share < 1, "lost_share in [0, 1)");
   want(s.facing_modulation > 0 && s.reference_mm > 0, "facing_modulation and reference_mm > 0");
 }
 
@@ -45,7 +46,7 @@ double facing_sigma(const StructuredLight& s) {
          std::sqrt(2.0 / s.steps) * s.image_noise / s.facing_modulation;
 }
 
-Return light_of(const RayScene& scene, const StructuredLight& s, const Hit& hit, const Vec3& ray, double albedo) {
+Return light_of(const RayScene& scene, const StructuredLight& s, const Hit& hit, const Vec3& ray, const Body& body) {
   if (hit.body < 0) return {};
   const Vec3 point = ray * hit.z, projector(s.baseline_mm, 0, 0);
   const Vec3 to_light = projector - point;
@@ -56,14 +57,25 @@ Return light_of(const RayScene& scene, const StructuredLight& s, const Hit& hit,
   const double reference = std::hypot(s.reference_mm, s.baseline_mm);
   const double falloff = reference / to_light.norm();
   const double modulation =
-      s.facing_modulation * (albedo / 0.5) * cos_light * (reference / s.reference_mm) * falloff * falloff;
+      s.facing_modulation * (body.albedo / 0.5) * cos_light * (reference / s.reference_mm) * falloff * falloff;
   if (std::min(cos_light, cos_eye) < std::cos(s.max_incidence)) return {modulation, Invalid::grazing};
   // A lobe about the mirror direction, Blinn's with exponent 200 (machined metal: half width 6 deg), that fills the
   // camera's range once it adds 1.5 times the diffuse light of a facing surface.
   const double mirror = std::pow(std::max(0.0, hit.normal.dot((l + e).normalized())), 200);
-  if (s.highlight * mirror * falloff * falloff > 0.45 + 0.1 * (1 - cos_light)) return {modulation, Invalid::saturated};
+  if (body.shine * s.highlight * mirror * falloff * falloff > 0.45 + 0.1 * (1 - cos_light))
+    return {modulation, Invalid::saturated};
   if (modulation < s.min_modulation) return {modulation, Invalid::dark};
   return {modulation, Invalid::measured};
+}
+
+/// The value that a standard normal exceeds with this probability.
+double upper_quantile(double share) {
+  double low = -8, high = 8;
+  for (int i = 0; i < 60; ++i) {
+    const double middle = (low + high) / 2;
+    (0.5 * std::erfc(middle / std::sqrt(2.0)) > share ? low : high) = middle;
+  }
+  return low;
 }
 
 /// One measured value: depth and modulation.
@@ -98,8 +110,7 @@ Measured mixed_pixel(const RayScene& scene, const StructuredLight& s, const std:
       continue;
     }
     // The sub-ray's own place in the image belongs to the pixel's middle: the phase is compared at equal x / z.
-    add(column(r, hit.z) - s.projector_focal_px * (r.x() - ray.x()),
-        light_of(scene, s, hit, r, bodies[hit.body].albedo));
+    add(column(r, hit.z) - s.projector_focal_px * (r.x() - ray.x()), light_of(scene, s, hit, r, bodies[hit.body]));
   }
   Measured result{middle.z, middle_light};
   result.light.modulation = std::abs(sum) / count;
@@ -213,16 +224,21 @@ SimulatedScan simulate_scan(const std::vector<Body>& bodies, const StructuredLig
   for (double& k : c) k = random.uniform(-1, 1), sum += std::abs(k);
   for (double& k : c) k /= sum;
 
+  // Blots of some pixels: where a smooth field of sd 1 is above the level that the share asks for.
+  const Image<float> blots = sensor.lost_share > 0 ? noise_field(w, h, 3, mixed(seed ^ 0xB107u)) : Image<float>();
+  const double lost_above = sensor.lost_share > 0 ? upper_quantile(sensor.lost_share) : 0;
+
   parallel_ranges(h, kRows, [&](int begin, int end) {
     for (int v = begin; v < end; ++v)
       for (int u = 0; u < w; ++u) {
         const Hit& hit = hits(u, v);
         if (hit.body < 0) continue;
         const Vec3 ray = camera.ray(u, v);
-        Measured m{hit.z, light_of(scene, sensor, hit, ray, bodies[hit.body].albedo)};
+        Measured m{hit.z, light_of(scene, sensor, hit, ray, bodies[hit.body])};
         // A break is more than the noise shows: below it, mixing changes nothing that one could see.
         if (sensor.mixed_pixels && on_edge(out, u, v, std::max(0.05, 2 * sigma0)))
           m = mixed_pixel(scene, sensor, bodies, u, v, hit, m.light);
+        if (!blots.empty() && blots(u, v) > lost_above) m.light.state = Invalid::lost;
         out.scan.invalid_reason(u, v) = static_cast<std::uint8_t>(m.light.state);
         if (m.light.state != Invalid::measured) continue;
         const double range = m.z / sensor.reference_mm;

@@ -28,6 +28,7 @@ struct StructuredLight {
   double systematic = 0.0002;           ///< largest relative depth error, quadratic over the image
   double noise_mm = 0;                  ///< > 0: sd of z on a facing surface of albedo 0.5 at reference_mm, in place of
                                         ///< the one that image_noise gives
+  double lost_share = 0;                ///< share of the pixels that are lost for no reason that is modelled, in blots
   bool mixed_pixels = true;             ///< pixels on depth edges mix the fringes of both surfaces
 };
 
@@ -36,10 +37,11 @@ struct Body {
   const Mesh* mesh = nullptr;
   Pose camera_from_body = Pose::Identity();
   double albedo = 0.5;
+  double shine = 1;  ///< 0 matt .. 1 machined metal: scales StructuredLight::highlight
 };
 
 /// Why a pixel has no measurement: values of Scan::invalid_reason.
-enum class Invalid : std::uint8_t { measured = 0, nothing_there, shadow, dark, grazing, saturated };
+enum class Invalid : std::uint8_t { measured = 0, nothing_there, shadow, dark, grazing, saturated, lost };
 
 /// What the camera sees of one body. Counts as in BOP.
 struct BodyTruth {
