@@ -17,6 +17,7 @@ struct Sums {
   std::array<double, 6> b{};
   double squares = 0, squares_sigma = 0, weight = 0;
   int pixels = 0;
+  std::array<int, 200> residuals{};  ///< histogram of |residual| in tenths of sigma, for their median
 
   void add(const Sums& o) {
     for (std::size_t i = 0; i < h.size(); ++i) h[i] += o.h[i];
@@ -25,6 +26,16 @@ struct Sums {
     squares_sigma += o.squares_sigma;
     weight += o.weight;
     pixels += o.pixels;
+    for (std::size_t i = 0; i < residuals.size(); ++i) residuals[i] += o.residuals[i];
+  }
+
+  /// Robust sd of the residuals in sigmas: 1.48 times their median; 1 when the noise alone explains them.
+  double spread() const {
+    int all = 0, sum = 0;
+    for (const int n : residuals) all += n;
+    for (std::size_t i = 0; i < residuals.size(); ++i)
+      if (2 * (sum += residuals[i]) > all) return 1.4826 * 0.1 * (static_cast<double>(i) + 0.5);
+    return 1;
   }
 };
 
@@ -42,7 +53,7 @@ bool inside_silhouette(const IndexRender& r, int i, int j) {
 }
 
 Sums accumulate(const SceneDepth& scene, const IndexRender& render, const Eigen::Vector3d& center, double scale_mm,
-                double cad_sigma_mm, bool final_pass) {
+                double cad_sigma_mm, double kernel_sigmas, bool final_pass) {
   std::vector<Sums> bands(static_cast<std::size_t>((render.height + kBandRows - 1) / kBandRows));
   const PinholeCamera& camera = scene.camera;
   parallel_ranges(render.height, kBandRows, [&](int begin, int end) {
@@ -63,7 +74,9 @@ Sums accumulate(const SceneDepth& scene, const IndexRender& render, const Eigen:
         const double r = (z - z_model) * along;       // signed distance of the scan point from the facet
         const double sigma_noise = scene.sigma_mm(u, v) * std::abs(along);
         const double variance = sigma_noise * sigma_noise + cad_sigma_mm * cad_sigma_mm;
-        const double scale2 = std::max(scale_mm * scale_mm, 9.0 * variance);
+        const double e2 = r * r / variance;
+        if (e2 < 400) ++s.residuals[static_cast<std::size_t>(10 * std::sqrt(e2))];
+        const double scale2 = std::max(scale_mm * scale_mm, kernel_sigmas * kernel_sigmas * variance);
         const double g = scale2 / (scale2 + r * r);
         const double robust = g * g;
         if (final_pass && robust < 0.25) continue;
@@ -163,6 +176,7 @@ Refinement refine_pose(const RenderMesh& mesh, const SceneDepth& scene, const Po
   const double end_scale = 3 * std::hypot(0.3 * scene.median_sigma_mm, options.cad_sigma_mm);
   const double ratio = std::pow(std::max(1.0, options.start_scale_mm / end_scale), 1.0 / std::max(1, options.iterations - 2));
   double scale = options.start_scale_mm;
+  double kernel = options.kernel_sigmas;
   Vec6 scale6;
   scale6 << 1, 1, 1, 1 / options.lever_mm, 1 / options.lever_mm, 1 / options.lever_mm;
   for (int it = 0; it <= options.iterations; ++it) {
@@ -170,7 +184,7 @@ Refinement refine_pose(const RenderMesh& mesh, const SceneDepth& scene, const Po
     const Eigen::Vector3d center = out.camera_from_part * Eigen::Vector3d(options.center);
     render_index(mesh, scene.camera, out.camera_from_part, options.step_px, render);
     const Sums sums =
-        accumulate(scene, render, center, std::max(scale, end_scale), options.cad_sigma_mm, final_pass);
+        accumulate(scene, render, center, std::max(scale, end_scale), options.cad_sigma_mm, kernel, final_pass);
     // Pixels nearer than the noise's correlation count once.
     const double independent =
         1 / std::max(1.0, correlation_inflation(scene.correlation_px) / (double(render.step) * render.step));
@@ -179,6 +193,9 @@ Refinement refine_pose(const RenderMesh& mesh, const SceneDepth& scene, const Po
     out.rms_mm = sums.weight > 0 ? std::sqrt(sums.squares / sums.weight) : 0;
     out.rms_sigma = sums.weight > 0 ? std::sqrt(sums.squares_sigma / sums.weight) : 0;
     if (sums.pixels < 12) break;
+    // A sensor whose errors on this part are larger than its noise elsewhere (shine, warp) gets a wider kernel, else whole faces
+    // would be dropped in favour of others. Four times, because beyond that it is no longer the same surface.
+    kernel = options.kernel_sigmas * std::clamp(sums.spread(), 1.0, 4.0);
     Vector6 b;
     for (int a = 0; a < 6; ++a) b[a] = sums.b[static_cast<std::size_t>(a)] * independent;
     if (options.outlines) {

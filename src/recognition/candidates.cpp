@@ -132,16 +132,12 @@ RefineOptions refine_options(const Part& part, int step_px, int iterations, doub
   return o;
 }
 
-std::vector<Candidate> find_candidates(const SceneFeatures& features, const SceneDepth& scene, const Part& part,
-                                       int part_index, std::vector<Reason>& rejected) {
-  std::vector<Pose> poses;
-  hypotheses_from_pairs(features, part, poses);
-  hypotheses_from_cylinders(features, part, poses);
-  hypotheses_from_planes(features, part, poses);
-  const std::size_t from_primitives = poses.size();
-  hypotheses_from_regions(features, part, poses);
+namespace {
 
-  std::vector<Scored> coarse = look_up_all(scene, part, poses, from_primitives);
+/// Hypotheses -> look-up -> settled -> rendered, each time fewer.
+std::vector<PoseCandidate> sift(const SceneDepth& scene, const Part& part, int part_index, const std::vector<Pose>& poses,
+                            std::size_t settle_from, std::vector<Reason>& rejected) {
+  std::vector<Scored> coarse = look_up_all(scene, part, poses, settle_from);
   if (poses.size() > coarse.size())
     add_reason(rejected, {part.name, "hypothesis", "look_up", coarse.empty() ? 0.0 : 0.3, 0.3,
                           static_cast<int>(poses.size() - coarse.size())});
@@ -149,10 +145,10 @@ std::vector<Candidate> find_candidates(const SceneFeatures& features, const Scen
   std::vector<Scored> settled = settle(scene, part, std::move(coarse));
   settled = best_apart(part, std::move(settled), 24, 0.02 * part.diameter_mm, 6 * kDegree);
 
-  std::vector<Candidate> out(settled.size());
+  std::vector<PoseCandidate> out(settled.size());
   parallel_each(static_cast<int>(settled.size()), [&](int i) {
     const auto k = static_cast<std::size_t>(i);
-    Candidate& c = out[k];
+    PoseCandidate& c = out[k];
     c.part = part_index;
     const int step = step_for(part, scene, settled[k].pose, 1500);
     const double start = std::max(0.012 * part.diameter_mm, noise_tolerance(scene));
@@ -161,7 +157,31 @@ std::vector<Candidate> find_candidates(const SceneFeatures& features, const Scen
     c.verification = verify_pose(part.render_mesh, scene, c.camera_from_part,
                                  verification_options(part, step, 0.004 * part.diameter_mm));
   });
-  std::stable_sort(out.begin(), out.end(), [](const Candidate& a, const Candidate& b) {
+  std::stable_sort(out.begin(), out.end(), [](const PoseCandidate& a, const PoseCandidate& b) {
+    return a.verification.gain > b.verification.gain;
+  });
+  return out;
+}
+
+}  // namespace
+
+std::vector<PoseCandidate> find_candidates(const SceneFeatures& features, const SceneDepth& scene, const Part& part,
+                                       int part_index, std::vector<Reason>& rejected) {
+  std::vector<Pose> poses;
+  hypotheses_from_pairs(features, part, poses);
+  hypotheses_from_cylinders(features, part, poses);
+  hypotheses_from_planes(features, part, poses);
+  std::vector<PoseCandidate> out = sift(scene, part, part_index, poses, poses.size(), rejected);
+  // Regions and the sweep cost more than they bring where primitives already led to a pose that fits.
+  const auto fits = [](const PoseCandidate& c) { return c.verification.fit() > 0.5 && c.verification.contour() > 0.5; };
+  for (const auto& generate : {hypotheses_from_regions, hypotheses_from_sweep}) {
+    if (std::any_of(out.begin(), out.end(), fits)) break;
+    poses.clear();
+    generate(features, part, poses);
+    const std::vector<PoseCandidate> more = sift(scene, part, part_index, poses, 0, rejected);
+    out.insert(out.end(), more.begin(), more.end());
+  }
+  std::stable_sort(out.begin(), out.end(), [](const PoseCandidate& a, const PoseCandidate& b) {
     return a.verification.gain > b.verification.gain;
   });
   return out;

@@ -10,7 +10,7 @@
 namespace tribin {
 
 /// A pose of a part that survived the look-up and was refined and verified by rendering.
-struct Candidate {
+struct PoseCandidate {
   int part = 0;  ///< index into the parts
   Pose camera_from_part = Pose::Identity();
   Verification verification;
@@ -28,7 +28,7 @@ VerificationOptions verification_options(const Part& part, int step_px, double t
 RefineOptions refine_options(const Part& part, int step_px, int iterations, double start_scale_mm);
 
 /// All candidates of one part in the scan, best evidence first.
-std::vector<Candidate> find_candidates(const SceneFeatures& features, const SceneDepth& scene, const Part& part,
+std::vector<PoseCandidate> find_candidates(const SceneFeatures& features, const SceneDepth& scene, const Part& part,
                                        int part_index, std::vector<Reason>& rejected);
 
 /// Do two poses of one part mean the same placing, up to the look-up's coarse steps?

@@ -94,7 +94,7 @@ void CellMask::join(const CellMask& other) {
   for (const std::uint64_t b : bits) count += std::popcount(b);
 }
 
-CellMask mask_of(const Part& part, const SceneDepth& scene, const Candidate& candidate) {
+CellMask mask_of(const Part& part, const SceneDepth& scene, const PoseCandidate& candidate) {
   CellMask mask;
   const Image<Vec3f>& cells = scene.cell_normal;
   mask.bits.assign((cells.size() + 63) / 64, 0);
@@ -167,7 +167,7 @@ std::vector<double> log_likelihoods(const SceneDepth& scene, std::span<const std
   return out;
 }
 
-Polished polish(const SceneDepth& scene, std::span<const Part> parts, const Candidate& candidate) {
+Polished polish(const SceneDepth& scene, std::span<const Part> parts, const PoseCandidate& candidate) {
   const Part& part = parts[static_cast<std::size_t>(candidate.part)];
   const double noise = 4 * scene.median_sigma_mm;
   const int few = step_for(part, scene, candidate.camera_from_part, kCompareFew);

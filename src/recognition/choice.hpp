@@ -18,20 +18,20 @@ struct CellMask {
 
 /// A candidate brought to its best: its self-similar poses and spins tried, refined on more pixels.
 struct Polished {
-  Candidate candidate;
+  PoseCandidate candidate;
   CellMask mask;
   double log_likelihood = 0;                    ///< of the pixels in `window`, noise and correlation counted
   std::vector<std::pair<Pose, double>> others;  ///< self-similar poses and their log-likelihood, best first
 };
 
 /// The cells whose pixels a rendered pose supports.
-CellMask mask_of(const Part& part, const SceneDepth& scene, const Candidate& candidate);
+CellMask mask_of(const Part& part, const SceneDepth& scene, const PoseCandidate& candidate);
 
 /// Log-likelihood of the scan where any of the poses predicts something: each pixel's residual in its local sigma, bounded
 /// at 4 sigma, over the equivalent number of independent pixels. Only differences between poses mean something.
 std::vector<double> log_likelihoods(const SceneDepth& scene, std::span<const std::pair<const Part*, Pose>> poses, int step_px);
 
-Polished polish(const SceneDepth& scene, std::span<const Part> parts, const Candidate& candidate);
+Polished polish(const SceneDepth& scene, std::span<const Part> parts, const PoseCandidate& candidate);
 
 /// Limits that an answer must keep. Value and limit go into `rejected` when one fails.
 bool acceptable(const Part& part, const Verification& verification, std::vector<Reason>& rejected);

@@ -50,6 +50,10 @@ void hypotheses_from_pairs(const SceneFeatures& scene, const Part& part, std::ve
 /// \source the paper's "distance based classifier in 2-D image space" (III-B), on what the other spaces leave.
 void hypotheses_from_regions(const SceneFeatures& scene, const Part& part, std::vector<Pose>& out);
 
+/// The same where regions are larger than the part (heaps, touching parts, noise): every view in every spin at places spread over
+/// all that no background explains. Tens of thousands of poses; the last resort.
+void hypotheses_from_sweep(const SceneFeatures& scene, const Part& part, std::vector<Pose>& out);
+
 /// Rotation that turns frame (x, y) of the part onto that of the camera: camera_from_part with R x_part = x_camera and the
 /// y of both in one half plane.
 Matrix3 rotation_from_directions(const Vec3& x_part, const Vec3& y_part, const Vec3& x_camera, const Vec3& y_camera);

@@ -76,12 +76,12 @@ Instances recognize(const Primitives& primitives, const PrimitiveModel& observat
   const SceneDepth scene = make_scene_depth(*surfels.scan, surfels);
   const SceneFeatures features = make_scene_features(primitives, observation, surfels);
 
-  std::vector<Candidate> candidates;
+  std::vector<PoseCandidate> candidates;
   for (std::size_t i = 0; i < parts.size(); ++i) {
-    std::vector<Candidate> found = find_candidates(features, scene, parts[i], static_cast<int>(i), out.rejected);
+    std::vector<PoseCandidate> found = find_candidates(features, scene, parts[i], static_cast<int>(i), out.rejected);
     candidates.insert(candidates.end(), found.begin(), found.end());
   }
-  std::stable_sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
+  std::stable_sort(candidates.begin(), candidates.end(), [](const PoseCandidate& a, const PoseCandidate& b) {
     return a.verification.gain > b.verification.gain;
   });
   std::vector<CellMask> masks(candidates.size());

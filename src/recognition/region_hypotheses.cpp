@@ -23,13 +23,18 @@ Vec2 quantiles(std::vector<double>& x) {
   return {low, *(x.end() - 1 - cut)};
 }
 
-/// Connected pieces of the cell grid that no background primitive explains.
-std::vector<Region> regions(const SceneFeatures& scene, const Part& part) {
-  const Surfels& surfels = *scene.surfels;
+/// Ids of the primitives that are too large for the part, as flags.
+std::vector<bool> background_flags(const SceneFeatures& scene, const Part& part) {
   std::vector<bool> background(scene.features.size() + 1, false);
   for (const SceneFeature& f : scene.features)
     if (is_background(f, part)) background[static_cast<std::size_t>(f.primitive->id)] = true;
+  return background;
+}
 
+/// Connected pieces of the cell grid that no background primitive explains.
+std::vector<Region> regions(const SceneFeatures& scene, const Part& part) {
+  const Surfels& surfels = *scene.surfels;
+  const std::vector<bool> background = background_flags(scene, part);
   const Image<std::int32_t>& grid = surfels.surfel_of_cell;
   Image<std::uint8_t> taken(grid.width, grid.height, 0);
   std::vector<Region> out;
@@ -109,6 +114,39 @@ void hypotheses_from_regions(const SceneFeatures& scene, const Part& part, std::
         const Vec3 part_point = part_u * along_u.mean() + part_v * along_v.mean() - view.direction * middle_depth;
         const Vec3 scene_point = region.u * region.along_u.mean() + region.v * region.along_v.mean() - region.toward * region.depth;
         out.push_back(pose_from(r, part_point, scene_point));
+      }
+    }
+  }
+}
+
+void hypotheses_from_sweep(const SceneFeatures& scene, const Part& part, std::vector<Pose>& out) {
+  constexpr int kSpins = 12;
+  const Surfels& surfels = *scene.surfels;
+  const std::vector<bool> background = background_flags(scene, part);
+  // Anchors a fifth of the diameter apart: the look-up settles a tenth.
+  const double spacing = 0.2 * part.diameter_mm;
+  std::vector<Vec3> anchors;
+  for (std::size_t s = 0; s < surfels.size(); ++s) {
+    if (background[static_cast<std::size_t>(scene.primitives->label_of_surfel[s])]) continue;
+    const Vec3 p = surfels.position[s].cast<double>();
+    if (std::none_of(anchors.begin(), anchors.end(), [&](const Vec3& a) { return (a - p).squaredNorm() < spacing * spacing; }))
+      anchors.push_back(p);
+  }
+  for (const Vec3& anchor : anchors) {
+    const Vec3 toward = Vec3(-Eigen::Vector3d(anchor).normalized());
+    Vec3 su, sv;
+    orthonormal_basis(toward, su, sv);
+    for (const PartView& view : part.views) {
+      if (view.points.empty()) continue;
+      Vec3 pu, pv;
+      orthonormal_basis(view.direction, pu, pv);
+      Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+      for (const Vec3f& p : view.points) mean += p.cast<double>();
+      mean /= static_cast<double>(view.points.size());
+      for (int k = 0; k < kSpins; ++k) {
+        const double a = 2 * kPi * k / kSpins;
+        const Matrix3 r = rotation_from_directions(view.direction, pu, toward, su * std::cos(a) + sv * std::sin(a));
+        out.push_back(pose_from(r, Vec3(mean), anchor));
       }
     }
   }
