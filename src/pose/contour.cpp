@@ -60,7 +60,7 @@ ContourSums contour_sums(const RenderMesh& mesh, const SceneDepth& scene, const 
   const auto faces_camera = [&](std::int32_t t, const Eigen::Vector3d& at) {
     return t >= 0 && (rotation * mesh.normals[static_cast<std::size_t>(t)].cast<double>()).dot(at) < 0;
   };
-  for (const MeshEdge& edge : mesh.edges) {
+  for (const OutlineEdge& edge : mesh.edges) {
     const Eigen::Vector3d p0 = camera_from_part * mesh.vertices[edge.vertices[0]].cast<double>();
     const Eigen::Vector3d p1 = camera_from_part * mesh.vertices[edge.vertices[1]].cast<double>();
     if (p0.z() <= 1 || p1.z() <= 1) continue;

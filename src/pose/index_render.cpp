@@ -13,7 +13,7 @@ struct ScreenVertex {
 };
 
 /// Every edge once, without those between coplanar triangles, which are never an outline.
-std::vector<MeshEdge> outline_edges(const RenderMesh& mesh) {
+std::vector<OutlineEdge> outline_edges(const RenderMesh& mesh) {
   struct Half {
     std::uint32_t low, high;
     std::int32_t triangle;
@@ -28,11 +28,11 @@ std::vector<MeshEdge> outline_edges(const RenderMesh& mesh) {
   std::sort(halves.begin(), halves.end(), [](const Half& a, const Half& b) {
     return std::tie(a.low, a.high, a.triangle) < std::tie(b.low, b.high, b.triangle);
   });
-  std::vector<MeshEdge> out;
+  std::vector<OutlineEdge> out;
   for (std::size_t i = 0; i < halves.size();) {
     std::size_t j = i + 1;
     while (j < halves.size() && halves[j].low == halves[i].low && halves[j].high == halves[i].high) ++j;
-    MeshEdge e{{halves[i].low, halves[i].high}, {halves[i].triangle, j > i + 1 ? halves[i + 1].triangle : -1}};
+    OutlineEdge e{{halves[i].low, halves[i].high}, {halves[i].triangle, j > i + 1 ? halves[i + 1].triangle : -1}};
     const bool coplanar = e.triangles[1] >= 0 && mesh.normals[static_cast<std::size_t>(e.triangles[0])].dot(
                                                      mesh.normals[static_cast<std::size_t>(e.triangles[1])]) > 0.999999f;
     if (!coplanar && j - i <= 2) out.push_back(e);

@@ -52,7 +52,7 @@ View view_along(const Vec3& direction, const Vec3& down, const Vec3& center, dou
   return view;
 }
 
-void Canvas::draw(const Surface& s) {
+void Canvas::draw(const ShadedSurface& s) {
   std::vector<Vec3> projected(s.vertices.size());
   for (std::size_t i = 0; i < projected.size(); ++i) projected[i] = view.project(s.vertices[i].cast<double>());
   for (std::size_t t = 0; t < s.triangles.size(); ++t) {

@@ -11,7 +11,7 @@
 namespace tribin::report {
 
 /// Triangles to draw: shared vertices with normals (towards the viewer or not: shading turns them), one material each.
-struct Surface {
+struct ShadedSurface {
   std::vector<Vec3f> vertices;
   std::vector<Vec3f> normals;  ///< of the vertices; empty = flat triangles
   std::vector<std::array<std::uint32_t, 3>> triangles;
@@ -44,7 +44,7 @@ struct Canvas {
   Image<float> depth;
 
   explicit Canvas(const View& v) : view(v), indices(v.width, v.height, 0), depth(v.width, v.height, 1e30f) {}
-  void draw(const Surface& surface);
+  void draw(const ShadedSurface& surface);
   /// A line in space, `width_px` wide, where it is nearer than the depth buffer + slack_mm; it leaves the buffer alone.
   void line(const Vec3& a, const Vec3& b, Material material, double width_px, double slack_mm);
 };

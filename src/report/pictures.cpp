@@ -122,7 +122,7 @@ struct Height {
     return std::clamp(static_cast<int>((up.dot(p) - low) / (high - low) * kHeights), 0, kHeights - 1);
   }
 };
-Height height_over(const Observation& seen, const Surface& surface) {
+Height height_over(const Observation& seen, const ShadedSurface& surface) {
   Height out;
   const Primitive* largest = nullptr;
   for (const Primitive& p : seen.primitives.items)
@@ -137,7 +137,7 @@ Height height_over(const Observation& seen, const Surface& surface) {
   return out;
 }
 
-void paint_heights(Surface& surface, const Height& height) {
+void paint_heights(ShadedSurface& surface, const Height& height) {
   for (std::size_t t = 0; t < surface.triangles.size(); ++t) {
     surface.materials[t] = Material::height;
     surface.steps[t] =
@@ -152,7 +152,7 @@ std::string scan_solids(const Observation& seen, const Sighting& where, const Vi
   const PixelLook out_of_sight{Material::halo};
   std::string out;
   {
-    Surface cloud = surface_of(seen.scan, seen.surfels, where, stride,
+    ShadedSurface cloud = surface_of(seen.scan, seen.surfels, where, stride,
                                [&](int u, int v) { return on_part(where, u, v) ? PixelLook{} : out_of_sight; });
     const Height height = height_over(seen, cloud);
     paint_heights(cloud, height);
@@ -192,7 +192,7 @@ std::string cad_solids(const Part& part, const Pose& pose, const View& view, int
   cad.draw(surface_of(part.mesh, pose, Material::grey));
   draw_edges(cad, part.mesh, edges, pose, Material::line, width, 0);
   Canvas model(view);
-  Surface coloured = surface_of(part.mesh, pose, Material::none);
+  ShadedSurface coloured = surface_of(part.mesh, pose, Material::none);
   colour_by_primitives(coloured, part, pose);
   model.draw(coloured);
   return figure("h", "CAD as read: " + grouped(static_cast<long long>(part.mesh.triangles.size())) + " triangles",

@@ -6,7 +6,7 @@
 
 namespace tribin::report {
 
-SurfacePoint nearest_on(const Primitive& p, const Vec3& x) {
+ShapePoint nearest_on(const Primitive& p, const Vec3& x) {
   const Vec3 from = x - p.point;
   switch (p.type) {
     case PrimitiveType::plane:
@@ -75,7 +75,7 @@ std::vector<Edge> edges_of(const Mesh& mesh) {
   return out;
 }
 
-Surface surface_of(const Mesh& mesh, const Pose& b_from_part, Material material) {
+ShadedSurface surface_of(const Mesh& mesh, const Pose& b_from_part, Material material) {
   // Each triangle has its own corners; a corner's normal is the mean over the triangles at its vertex that turn by less
   // than a crease from it.
   const double kCrease = std::cos(25 * kDegree);
@@ -86,7 +86,7 @@ Surface surface_of(const Mesh& mesh, const Pose& b_from_part, Material material)
     units[t] = normals[t].normalized();
     for (std::uint32_t v : mesh.triangles[t]) at_vertex[v].push_back(static_cast<std::uint32_t>(t));
   }
-  Surface out;
+  ShadedSurface out;
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     for (std::uint32_t v : mesh.triangles[t]) {
       Vec3 sum = Vec3::Zero();
@@ -102,7 +102,7 @@ Surface surface_of(const Mesh& mesh, const Pose& b_from_part, Material material)
   return out;
 }
 
-void colour_by_primitives(Surface& surface, const Part& part, const Pose& b_from_part) {
+void colour_by_primitives(ShadedSurface& surface, const Part& part, const Pose& b_from_part) {
   // A triangle lies on a surface when its corners do, within 0.3 % of the diameter (a coarse chord), and its normal is
   // within 20 degrees (a coarse facet); among those the nearest wins.
   const double reach = 0.003 * part.diameter_mm, turn = std::cos(20 * kDegree);

@@ -7,11 +7,11 @@ namespace tribin::report {
 
 /// The point of a primitive's untrimmed surface nearest to x, and the surface's normal there (outward, away from the
 /// axis).
-struct SurfacePoint {
+struct ShapePoint {
   Vec3 point = Vec3::Zero();
   Vec3 normal = Vec3::UnitZ();
 };
-SurfacePoint nearest_on(const Primitive& primitive, const Vec3& x);
+ShapePoint nearest_on(const Primitive& primitive, const Vec3& x);
 
 /// Mesh edges that a draughtsman would draw: creases, rims, and, for one view, silhouettes.
 struct Edge {
@@ -22,10 +22,10 @@ struct Edge {
 std::vector<Edge> edges_of(const Mesh& mesh);
 
 /// The mesh with normals smoothed over all but the creases. \param b_from_part moves it.
-Surface surface_of(const Mesh& mesh, const Pose& b_from_part, Material material);
+ShadedSurface surface_of(const Mesh& mesh, const Pose& b_from_part, Material material);
 
 /// Gives each triangle of a part's surface the colour of the primitive of its model that it lies on.
-void colour_by_primitives(Surface& surface, const Part& part, const Pose& b_from_part);
+void colour_by_primitives(ShadedSurface& surface, const Part& part, const Pose& b_from_part);
 
 /// Draws the visible edges of a posed mesh. \param canvas holds the depths of that mesh.
 void draw_edges(Canvas& canvas, const Mesh& mesh, const std::vector<Edge>& edges, const Pose& b_from_part,

@@ -122,10 +122,10 @@ Vec3f normal_at(const Grid& grid, const Surfels& surfels, int u, int v, int i, i
 
 }  // namespace
 
-Surface surface_of(const Scan& scan, const Surfels& surfels, const Sighting& where, int stride,
+ShadedSurface surface_of(const Scan& scan, const Surfels& surfels, const Sighting& where, int stride,
                    const std::function<PixelLook(int u, int v)>& look) {
   const Grid grid = grid_of(scan, where, stride);
-  Surface out;
+  ShadedSurface out;
   std::vector<std::int64_t> vertex(grid.points.size(), -1);
   std::vector<PixelLook> looks(grid.points.size());
   for (int j = 0; j < grid.height; ++j)
@@ -137,7 +137,7 @@ Surface surface_of(const Scan& scan, const Surfels& surfels, const Sighting& whe
       if (looks[k].material == Material::halo) continue;
       vertex[k] = static_cast<std::int64_t>(out.vertices.size());
       if (looks[k].onto) {
-        const SurfacePoint on = nearest_on(*looks[k].onto, grid.points[k].cast<double>());
+        const ShapePoint on = nearest_on(*looks[k].onto, grid.points[k].cast<double>());
         out.vertices.push_back(on.point.cast<float>());
         out.normals.push_back(on.normal.cast<float>());
       } else {

@@ -28,7 +28,7 @@ struct PixelLook {
 };
 
 /// The scan inside a rectangle as triangles, every `stride` pixels; holes stay holes, depth edges are not bridged.
-Surface surface_of(const Scan& scan, const Surfels& surfels, const Sighting& where, int stride,
+ShadedSurface surface_of(const Scan& scan, const Surfels& surfels, const Sighting& where, int stride,
                    const std::function<PixelLook(int u, int v)>& look);
 
 }  // namespace tribin::report

@@ -84,7 +84,7 @@ Surface surface_of(const CadFace& face, const Surfels& s, const Indices& support
 
 }  // namespace
 
-void take_cad_faces(Scene& scene, std::vector<Found>& found) {
+void take_cad_faces(Scene& scene, std::vector<FoundSurface>& found) {
   const Surfels& s = scene.surfels;
   const Mesh& mesh = *s.mesh;
   if (mesh.faces.empty() || mesh.face_of_triangle.size() != mesh.triangles.size()) return;
@@ -117,7 +117,7 @@ void take_cad_faces(Scene& scene, std::vector<Found>& found) {
   }
   for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
     if (triangles[f].empty() || !is_primitive(mesh.faces[f].type)) continue;
-    Found next;
+    FoundSurface next;
     next.fit.surface = surface_of(mesh.faces[f], s, triangles[f]);
     next.fit.valid = true;
     next.support = triangles[f];

@@ -46,11 +46,11 @@ Indices seed_of(const Surfels& s, const Indices& component) {
                             [&](std::uint32_t a, std::uint32_t b) { return s.area_mm2[a] < s.area_mm2[b]; })};
 }
 
-std::optional<Found> explain_plane(Scene& scene, const Indices& whole, PlaneVoters voters, const Limits& limits) {
+std::optional<FoundSurface> explain_plane(Scene& scene, const Indices& whole, PlaneVoters voters, const Limits& limits) {
   const Indices component = seed_of(scene.surfels, whole);
   Fit fit = fit_plane(scene.surfels, component);
   if (!fit.valid) return std::nullopt;
-  Found out;
+  FoundSurface out;
   for (int round = 0; round < 3; ++round) {
     out.support = grow(scene, fit.surface, component, fit.scale, kPlaneSlack);
     if (out.support.size() < limits.min_surfels) return std::nullopt;
@@ -70,14 +70,14 @@ std::optional<Found> explain_plane(Scene& scene, const Indices& whole, PlaneVote
 
 }  // namespace
 
-void take(Scene& scene, std::vector<Found>& found, Found&& next) {
+void take(Scene& scene, std::vector<FoundSurface>& found, FoundSurface&& next) {
   const auto id = static_cast<std::int32_t>(found.size() + 1);
   for (std::uint32_t i : next.support) scene.label[i] = id;
   found.push_back(std::move(next));
 }
 
 void find_planes(Scene& scene, const Limits& limits, PlaneVoters voters, HoughSpaces& spaces,
-                 std::vector<Found>& found) {
+                 std::vector<FoundSurface>& found) {
   const Surfels& s = scene.surfels;
   const DirectionBins& bins = ijk_bins();
   std::vector<float> votes;
@@ -134,7 +134,7 @@ void find_planes(Scene& scene, const Limits& limits, PlaneVoters voters, HoughSp
         for (;;) {  // a component may hold several planes a few degrees apart
           std::erase_if(left, [&](std::uint32_t i) { return !scene.free(i); });
           if (left.size() < least) break;
-          std::optional<Found> plane = explain_plane(scene, left, voters, limits);
+          std::optional<FoundSurface> plane = explain_plane(scene, left, voters, limits);
           if (!plane) break;
           plane->peak = peak_index;
           any = true;

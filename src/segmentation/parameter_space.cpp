@@ -71,7 +71,7 @@ std::vector<float> vote_rulings(const Scene& scene, const std::vector<Ruled>& ru
 
 }  // namespace
 
-void find_cylinders(Scene& scene, const Limits& limits, HoughSpaces& spaces, std::vector<Found>& found) {
+void find_cylinders(Scene& scene, const Limits& limits, HoughSpaces& spaces, std::vector<FoundSurface>& found) {
   const Surfels& s = scene.surfels;
   const DirectionBins& bins = axis_bins();
   std::vector<Ruled> ruled = ruled_surfels(scene);
@@ -119,7 +119,7 @@ void find_cylinders(Scene& scene, const Limits& limits, HoughSpaces& spaces, std
         Indices left = component;
         // A component may hold several cylinders: take the best, go on with the rest.
         while (left.size() >= least) {
-          std::optional<Found> next = explain_round(scene, left, axis, limits);
+          std::optional<FoundSurface> next = explain_round(scene, left, axis, limits);
           if (!next) break;
           next->peak = static_cast<int>(spaces.peaks.size());
           take(scene, found, std::move(*next));

@@ -55,7 +55,7 @@ double rms_mm(const Surfels& s, const Indices& support, const Surface& surface) 
   return std::sqrt(squares / static_cast<double>(support.size()));
 }
 
-Primitive primitive_of(const Surfels& s, Found& found) {
+Primitive primitive_of(const Surfels& s, FoundSurface& found) {
   const Surface& surface = found.fit.surface;
   Primitive p;
   p.type = surface.type;
@@ -117,7 +117,7 @@ Primitives segment(const Surfels& surfels, const SegmentationOptions& options) {
   const Limits limits = limits_of(surfels, scene, options);
   fill_ijk(surfels, out.spaces);
 
-  std::vector<Found> found;
+  std::vector<FoundSurface> found;
   if (surfels.mesh != nullptr) take_cad_faces(scene, found);
 
   // Back and forth among the spaces on what is left, until a round explains nothing more.
@@ -136,7 +136,7 @@ Primitives segment(const Surfels& surfels, const SegmentationOptions& options) {
   }
 
   // Largest first.
-  for (Found& f : found) out.items.push_back(primitive_of(surfels, f));
+  for (FoundSurface& f : found) out.items.push_back(primitive_of(surfels, f));
   std::stable_sort(out.items.begin(), out.items.end(),
                    [](const Primitive& a, const Primitive& b) { return a.area_mm2 > b.area_mm2; });
   if (surfels.scan != nullptr) {

@@ -92,7 +92,7 @@ double arc_of(const Surfels& s, const Indices& support, const Surface& surface) 
   return 2 * kPi - gap;
 }
 
-std::optional<Found> explain_round(Scene& scene, const Indices& component, const Vec3& axis, const Limits& limits) {
+std::optional<FoundSurface> explain_round(Scene& scene, const Indices& component, const Vec3& axis, const Limits& limits) {
   const Surfels& s = scene.surfels;
   const Surface rough = cylinder_from_normals(s, component, axis);
   if (!(rough.radius > 0) || rough.radius > 2 * limits.max_radius_mm) return std::nullopt;
@@ -149,7 +149,7 @@ std::optional<Found> explain_round(Scene& scene, const Indices& component, const
   }
   const double arc = arc_of(s, best->support, best->fit.surface);
   if (!accepted(scene, component, *best, arc, limits)) return std::nullopt;
-  Found out;
+  FoundSurface out;
   out.fit = best->fit;
   out.support = std::move(best->support);
   out.radius_from_cad = best->from_cad;
@@ -157,7 +157,7 @@ std::optional<Found> explain_round(Scene& scene, const Indices& component, const
   return out;
 }
 
-void find_cones_and_spheres(Scene& scene, const Limits& limits, std::vector<Found>& found) {
+void find_cones_and_spheres(Scene& scene, const Limits& limits, std::vector<FoundSurface>& found) {
   const Surfels& s = scene.surfels;
   const std::size_t least = std::max<std::size_t>(6, limits.min_surfels / 2);
   for (SurfelShape shape : {SurfelShape::ruled, SurfelShape::curved}) {
@@ -183,7 +183,7 @@ void find_cones_and_spheres(Scene& scene, const Limits& limits, std::vector<Foun
            c->support.size() < kSurfelsPerSigma * c->fit.rms_sigma ||
            std::sqrt(c->fit.covariance(4, 4)) > 0.1 * c->fit.surface.radius))
         continue;
-      Found out;
+      FoundSurface out;
       out.fit = c->fit;
       out.support = std::move(c->support);
       out.arc = arc;

@@ -11,7 +11,7 @@
 namespace tribin {
 
 /// An edge of the mesh and the two triangles beside it (-1 = a border).
-struct MeshEdge {
+struct OutlineEdge {
   std::array<std::uint32_t, 2> vertices;
   std::array<std::int32_t, 2> triangles;
 };
@@ -21,7 +21,7 @@ struct RenderMesh {
   std::vector<Vec3f> vertices;                           ///< part frame, mm
   std::vector<std::array<std::uint32_t, 3>> triangles;
   std::vector<Vec3f> normals;                            ///< unit, outward, one a triangle
-  std::vector<MeshEdge> edges;                           ///< those that can be an outline: not between coplanar triangles
+  std::vector<OutlineEdge> edges;                           ///< those that can be an outline: not between coplanar triangles
   bool two_sided = false;                                ///< the mesh has no known orientation
   Vec3 box_min = Vec3::Zero();
   Vec3 box_max = Vec3::Zero();
