@@ -28,6 +28,7 @@ constexpr LevelSettings kLevels[] = {
     {"hard", 20, 40, 3, 3.0, 1.0, 0.0010, 1.0, 15 * kDegree, 0.10, 0.25},
 };
 
+constexpr double kTableAlbedo = 0.2;  // a dark work bench: 2.5 times the noise of a bright part
 constexpr double kShareOfView =
     0.9;  // of the table's view in which parts may lie: tall ones reach outwards in the image
 
@@ -100,12 +101,14 @@ void simulate_table_dataset(const TableDatasetOptions& options, const std::files
     const Layout layout = lay_on_table(parts, half * sensor.camera.width / sensor.camera.fx,
                                        half * sensor.camera.height / sensor.camera.fy, random.bits());
 
-    std::vector<Body> bodies = {{&table, camera_from_table, 0.5, /*shine=*/0}};
+    std::vector<Body> bodies = {{&table, camera_from_table, kTableAlbedo, /*shine=*/0}};
     BopImage image{nullptr, camera_from_table, {0}};
     std::vector<int> counts(classes, 0);
+    std::vector<double> albedo(classes);  // one class, one finish: from painted dark to bright cast metal
+    for (double& a : albedo) a = random.uniform(0.2, 0.6);
     for (std::size_t i = 0; i < layout.laid.size(); ++i) {
       const int k = drawn[layout.laid[i]];
-      bodies.push_back({&options.parts[k], camera_from_table * layout.table_from_part[i], 0.5, 1});
+      bodies.push_back({&options.parts[k], camera_from_table * layout.table_from_part[i], albedo[k], 1});
       image.object_of_body.push_back(k + 1);
       ++counts[k];
     }
