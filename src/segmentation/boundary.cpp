@@ -197,7 +197,7 @@ std::optional<BoundaryCircle> fit_boundary_circle(const std::vector<Vec3f>& poin
     if (!x.allFinite()) return std::nullopt;
     c += Vec2(x[0], x[1]);
     radius += x[2];
-    mu = std::max(1.5 * pitch_mm, 0.7 * mu);
+    mu = std::max(2.0 * pitch_mm, 0.7 * mu);
   }
   BoundaryCircle circle;
   constexpr int kSectors = 72;  // of 5 deg
@@ -207,7 +207,7 @@ std::optional<BoundaryCircle> fit_boundary_circle(const std::vector<Vec3f>& poin
   for (const Vec2& q : flat) {
     const Vec2 d = q - c;
     const double e = d.norm() - radius;
-    if (std::abs(e) > 3.0 * pitch_mm) continue;
+    if (std::abs(e) > 4.0 * pitch_mm) continue;
     squares += e * e;
     ++inliers;
     sector[std::min(kSectors - 1, static_cast<int>((std::atan2(d.y(), d.x()) + kPi) / (2 * kPi) * kSectors))] = true;

@@ -14,7 +14,7 @@ std::vector<BoundaryLoop> plane_boundaries(const Primitive& plane, const Surfels
 void add_common_holes(std::vector<Primitive>& primitives, const Surfels& surfels);
 
 /// The circle through most of the points of a planar loop: robust, geometric distances.
-/// \return none where less than half of the points, or less than 90 deg, lie on one circle within 3 `pitch_mm`.
+/// \return none where less than half of the points, or less than 90 deg, lie on one circle within 4 `pitch_mm`.
 std::optional<BoundaryCircle> fit_boundary_circle(const std::vector<Vec3f>& points, const Vec3& normal,
                                                   double pitch_mm);
 

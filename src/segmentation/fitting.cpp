@@ -100,6 +100,30 @@ Sampled sample(const Surfels& surfels, std::span<const std::uint32_t> support, i
   return out;
 }
 
+/// Pixels of the support's cells, at most `most`, evenly strided; sd of a pixel along the surface's normal.
+Sampled sample_pixels(const Surfels& s, std::span<const std::uint32_t> support, std::size_t most) {
+  const Scan& scan = *s.scan;
+  const int n = s.cell_px, columns = s.surfel_of_cell.width;
+  const std::size_t total = support.size() * static_cast<std::size_t>(n) * n, stride = 1 + total / most;
+  Sampled out;
+  std::size_t k = 0;
+  for (std::uint32_t i : support) {
+    const int column = static_cast<int>(s.cell[i]) % columns, row = static_cast<int>(s.cell[i]) / columns;
+    const double sigma_z = s.local_sigma_mm(std::min(column / 8, s.local_sigma_mm.width - 1),
+                                            std::min(row / 8, s.local_sigma_mm.height - 1));
+    const Vec3 center = s.position[i].cast<double>();
+    const double facing = std::max(0.2, std::abs(s.normal[i].cast<double>().dot(center)) / center.z());
+    for (int v = row * n; v < (row + 1) * n; ++v)
+      for (int u = column * n; u < (column + 1) * n; ++u) {
+        // A stride that shares a factor with the cell would always take the same corner: the row shifts it.
+        if ((k++ + static_cast<std::size_t>(row)) % stride != 0 || !std::isfinite(scan.z_mm(u, v))) continue;
+        out.points.push_back(scan.point(u, v));
+        out.inverse_sigma.push_back(1.0 / (sigma_z * facing));
+      }
+  }
+  return out;
+}
+
 /// Geman-McClure: residuals far beyond `mu` sigmas lose their say. Cost mu^2 e^2 / (mu^2 + e^2).
 double robust_weight(double e, double mu) {
   const double k = mu * mu / (mu * mu + e * e);
@@ -260,7 +284,9 @@ double curvature_bound(const Surfels& surfels, std::span<const std::uint32_t> su
 Fit fit_round(const Surfels& surfels, std::span<const std::uint32_t> support, const Surface& start,
               const FitOptions& options) {
   Fit fit;
-  const Sampled data = sample(surfels, support, options.max_surfels);
+  const bool raw = options.raw_pixels && surfels.scan != nullptr;
+  const Sampled data = raw ? sample_pixels(surfels, support, static_cast<std::size_t>(options.max_surfels))
+                           : sample(surfels, support, options.max_surfels);
   if (data.points.size() < kParameters) return fit;
   Surface s = start;
   if (options.cone) s.type = PrimitiveType::cone;
@@ -292,7 +318,8 @@ Fit fit_round(const Surfels& surfels, std::span<const std::uint32_t> support, co
   const double sigma = median_of(sigmas);
   double points = 0;
   for (std::uint32_t i : support) points += surfels.points[i];
-  const double scale_limit = std::sqrt(points / static_cast<double>(support.size()));
+  // Pixels scatter by their sigma; means may wave by as much.
+  const double scale_limit = raw ? 2.0 : std::sqrt(points / static_cast<double>(support.size()));
   std::vector<double> scratch;
   double mu = std::max(3.0 * scale_of(s, data, scale_limit, scratch), options.start_mm / sigma);
   double lambda = 1e-4;
@@ -340,7 +367,7 @@ Fit fit_round(const Surfels& surfels, std::span<const std::uint32_t> support, co
     s.radius += middle * std::tan(s.half_angle);
   }
   if (!(s.radius > 0)) return fit;
-  fit.scale = residual_scale(surfels, support, s);
+  fit.scale = raw ? scale_of(s, data, scale_limit, scratch) : residual_scale(surfels, support, s);
   normal_equations(s, 3.0 * fit.scale, h, g);
   double squares = 0;
   int inliers = 0;
@@ -354,8 +381,12 @@ Fit fit_round(const Surfels& surfels, std::span<const std::uint32_t> support, co
   const Eigen::LDLT<Square> solver(h);
   if (solver.info() != Eigen::Success || solver.vectorD().minCoeff() <= 0) return fit;
   Square covariance = solver.solve(Square::Identity());
-  const double share = std::min(1.0, static_cast<double>(data.points.size()) / static_cast<double>(support.size()));
-  covariance *= correlation_inflation(surfels) * std::max(1.0, fit.rms_sigma * fit.rms_sigma) * share;
+  // Correlated noise averages down less than the number of data says; a sparse sample is less correlated.
+  const double all = raw ? points : static_cast<double>(support.size());
+  const double share = std::min(1.0, static_cast<double>(data.points.size()) / all);
+  const double correlation =
+      raw ? 4.0 * kPi * surfels.correlation_px * surfels.correlation_px : correlation_inflation(surfels);
+  covariance *= std::max(1.0, correlation * share) * std::max(1.0, fit.rms_sigma * fit.rms_sigma);
   const auto clear = [&](int i) {
     covariance.row(i).setZero();
     covariance.col(i).setZero();

@@ -46,6 +46,7 @@ struct FitOptions {
   bool cone = false;         ///< let the half angle go
   double start_mm = 0;       ///< robust scale to start at, 0 = already close
   int max_surfels = 4000;    ///< fit every k-th beyond that
+  bool raw_pixels = false;   ///< scan: fit the pixels behind the surfels; a cell's mean lies off a tight radius
 };
 
 /// Least squares of a plane to the surfels' positions, robust, weights 1 / sigma^2.
