@@ -20,13 +20,13 @@ struct Mask {
   Image<std::uint8_t> in;  ///< 1 = on the plane
 };
 
-struct Box {
+struct PixelBox {
   int low_u = 1 << 30, low_v = 1 << 30, high_u = -1, high_v = -1;
 };
 
 /// Of the first pixels of the support's cells.
-Box box_of(const Primitive& plane, const Surfels& s) {
-  Box box;
+PixelBox box_of(const Primitive& plane, const Surfels& s) {
+  PixelBox box;
   for (std::uint32_t i : plane.surfels) {
     const int u = static_cast<int>(s.cell[i]) % s.surfel_of_cell.width * s.cell_px;
     const int v = static_cast<int>(s.cell[i]) / s.surfel_of_cell.width * s.cell_px;
@@ -42,9 +42,9 @@ Box box_of(const Primitive& plane, const Surfels& s) {
 void add_pixels(const Primitive& plane, const Surfels& s, Mask& mask);
 
 Mask plane_pixels(std::span<const Primitive* const> planes, const Surfels& s) {
-  Box all;
+  PixelBox all;
   for (const Primitive* plane : planes) {
-    const Box box = box_of(*plane, s);
+    const PixelBox box = box_of(*plane, s);
     all = {std::min(all.low_u, box.low_u), std::min(all.low_v, box.low_v), std::max(all.high_u, box.high_u),
            std::max(all.high_v, box.high_v)};
   }
@@ -60,7 +60,7 @@ Mask plane_pixels(std::span<const Primitive* const> planes, const Surfels& s) {
 void add_pixels(const Primitive& plane, const Surfels& s, Mask& mask) {
   const Scan& scan = *s.scan;
   const int n = s.cell_px, columns = s.surfel_of_cell.width;
-  const Box box = box_of(plane, s);
+  const PixelBox box = box_of(plane, s);
   int low_u = box.low_u, low_v = box.low_v, high_u = box.high_u, high_v = box.high_v;
   const int reach = 2 * n;  // an edge's cell is refused, and so may be the one beside it
   low_u = std::max(0, low_u - reach);
@@ -274,14 +274,14 @@ void add_common_holes(std::vector<Primitive>& primitives, const Surfels& s) {
   std::vector<const Primitive*> planes;
   for (const Primitive& p : primitives)
     if (p.type == PrimitiveType::plane) planes.push_back(&p);
-  std::vector<Box> boxes;
+  std::vector<PixelBox> boxes;
   for (const Primitive* p : planes) boxes.push_back(box_of(*p, s));
   std::vector<std::vector<BoundaryLoop>> common(planes.size());
   parallel_each(static_cast<int>(planes.size()), [&](int a) {
     std::vector<const Primitive*> group{planes[static_cast<std::size_t>(a)]};
     const Primitive& largest = *group[0];
     for (std::size_t b = static_cast<std::size_t>(a) + 1; b < planes.size(); ++b) {  // planes come largest first
-      const Box &x = boxes[static_cast<std::size_t>(a)], &y = boxes[b];
+      const PixelBox &x = boxes[static_cast<std::size_t>(a)], &y = boxes[b];
       if (x.low_u > y.high_u + reach || y.low_u > x.high_u + reach || x.low_v > y.high_v + reach ||
           y.low_v > x.high_v + reach || largest.axis.dot(planes[b]->axis) < std::cos(kAngle))
         continue;

@@ -14,16 +14,16 @@ constexpr double kMaxSmoothRim = 0.30;
 constexpr double kSurfelsPerSigma = 28;  // pieces of the bust that end at edges: below 25; cylinders: above 28
 constexpr double kMaxRmsSigma = 3.5;     // rms of cell means in sigmas: right ones 1-1.5, compromises > 4
 
-struct Candidate {
+struct RoundCandidate {
   Fit fit;
   Indices support;
   bool from_cad = false;
 };
 
 /// Fit, grow, fit: from a component to all that lies on its surface.
-std::optional<Candidate> settle(Scene& scene, const Indices& component, const Surface& start, FitOptions options,
-                                const Limits& limits) {
-  Candidate c;
+std::optional<RoundCandidate> settle(Scene& scene, const Indices& component, const Surface& start, FitOptions options,
+                                     const Limits& limits) {
+  RoundCandidate c;
   options.max_surfels = 600;  // the place first
   c.fit = fit_round(scene.surfels, component, start, options);
   options.start_mm = 0;
@@ -39,7 +39,7 @@ std::optional<Candidate> settle(Scene& scene, const Indices& component, const Su
 }
 
 /// The last fit runs on the raw pixels; the residuals of the cells stay what the tests judge.
-void polish(const Scene& scene, Candidate& c) {
+void polish(const Scene& scene, RoundCandidate& c) {
   if (scene.surfels.scan == nullptr) return;
   FitOptions options;
   options.hold_radius = c.from_cad;
@@ -52,14 +52,14 @@ void polish(const Scene& scene, Candidate& c) {
   c.fit.covariance = fine.covariance;
 }
 
-std::size_t kept(const Scene& scene, const Indices& component, const Candidate& c) {
+std::size_t kept(const Scene& scene, const Indices& component, const RoundCandidate& c) {
   std::size_t count = 0;
   for (std::uint32_t i : component) count += fits(scene.surfels, i, c.fit.surface, c.fit.scale, kRoundSlack);
   return count;
 }
 
 /// Tests that every surface of revolution must pass before it explains anything.
-bool accepted(Scene& scene, const Indices& component, const Candidate& c, double arc, const Limits& limits) {
+bool accepted(Scene& scene, const Indices& component, const RoundCandidate& c, double arc, const Limits& limits) {
   const Surfels& s = scene.surfels;
   if (area_of(s, c.support) < limits.min_area_mm2) return false;
   if (c.fit.rms_sigma > kMaxRmsSigma) return false;
@@ -106,14 +106,15 @@ double arc_of(const Surfels& s, const Indices& support, const Surface& surface) 
   return 2 * kPi - gap;
 }
 
-std::optional<FoundSurface> explain_round(Scene& scene, const Indices& component, const Vec3& axis, const Limits& limits) {
+std::optional<FoundSurface> explain_round(Scene& scene, const Indices& component, const Vec3& axis,
+                                          const Limits& limits) {
   const Surfels& s = scene.surfels;
   const Surface rough = cylinder_from_normals(s, component, axis);
   if (!(rough.radius > 0) || rough.radius > 2 * limits.max_radius_mm) return std::nullopt;
 
   FitOptions free;
   free.start_mm = std::min(2.5, 0.15 * rough.radius);  // a step of 3 mm must not be bridged by the kernel
-  std::optional<Candidate> best = settle(scene, component, rough, free, limits);
+  std::optional<RoundCandidate> best = settle(scene, component, rough, free, limits);
   std::size_t best_kept = best ? kept(scene, component, *best) : 0;
   const double best_radius = best ? best->fit.surface.radius : rough.radius;
   const double best_sigma = best ? std::sqrt(best->fit.covariance(4, 4)) : 0.2 * rough.radius;
@@ -131,7 +132,7 @@ std::optional<FoundSurface> explain_round(Scene& scene, const Indices& component
       start.radius = radius;
       FitOptions held = free;
       held.hold_radius = true;
-      std::optional<Candidate> c = settle(scene, component, start, held, limits);
+      std::optional<RoundCandidate> c = settle(scene, component, start, held, limits);
       if (!c) continue;
       c->from_cad = true;
       const std::size_t count = kept(scene, component, *c);
@@ -152,7 +153,7 @@ std::optional<FoundSurface> explain_round(Scene& scene, const Indices& component
     const double sigma = std::sqrt(cone.covariance(5, 5));
     if (cone.valid && std::abs(cone.surface.half_angle) > std::max(5.0 * sigma, 0.7 * kDegree) &&
         cone.rms_sigma < 0.8 * best->fit.rms_sigma) {
-      Candidate c;
+      RoundCandidate c;
       c.fit = cone;
       c.support = grow(scene, cone.surface, best->support, cone.scale, kRoundSlack);
       if (c.support.size() >= limits.min_surfels) {
@@ -187,7 +188,7 @@ void find_cones_and_spheres(Scene& scene, const Limits& limits, std::vector<Foun
       FitOptions options;
       options.start_mm = std::min(2.5, 0.15 * start.radius);
       options.cone = !sphere;
-      std::optional<Candidate> c = settle(scene, component, start, options, limits);
+      std::optional<RoundCandidate> c = settle(scene, component, start, options, limits);
       if (!c) continue;
       if (std::abs(c->fit.surface.half_angle) > 80 * kDegree) continue;  // a dented plane
       const double arc = arc_of(s, c->support, c->fit.surface);
