@@ -89,7 +89,12 @@ void Canvas::line(const Vec3& a, const Vec3& b, Material material, double width_
   for (int i = 0; i <= steps; ++i) {
     const Vec3 at = p + (q - p) * (static_cast<double>(i) / steps);
     const int u0 = static_cast<int>(std::lround(at.x())), v0 = static_cast<int>(std::lround(at.y()));
-    if (!indices.contains(u0, v0) || at.z() > depth(u0, v0) + slack_mm) continue;
+    if (!indices.contains(u0, v0)) continue;
+    float behind = depth(u0, v0);  // of the neighbours too: a silhouette's own pixel may hold the face in front of it
+    for (int v = v0 - 1; v <= v0 + 1; ++v)
+      for (int u = u0 - 1; u <= u0 + 1; ++u)
+        if (depth.contains(u, v)) behind = std::max(behind, depth(u, v));
+    if (at.z() > behind + slack_mm) continue;
     for (int v = v0 - reach; v <= v0 + reach; ++v)
       for (int u = u0 - reach; u <= u0 + reach; ++u)
         if (indices.contains(u, v) && std::hypot(u - at.x(), v - at.y()) <= 0.5 * width_px) indices(u, v) = index;

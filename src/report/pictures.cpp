@@ -21,20 +21,24 @@ std::string painted(const Canvas& canvas, int part_class, const std::string& alt
   return picture(canvas.indices, palette(false, part_class), palette(true, part_class), alt);
 }
 
-/// Looks at a box from the camera's side, 24 degrees lower and 14 degrees from the left, so that steps and heights
+/// Looks at points from the camera's side, 24 degrees lower and 14 degrees from the left, so that steps and heights
 /// show.
-View view_of_box(const Vec3& low, const Vec3& high, const Pose& camera_from_part, int size_px, double margin) {
-  const Vec3 center = camera_from_part * Vec3(0.5 * (low + high));
-  const Vec3 ray = center.norm() > 1 ? Vec3(center.normalized()) : Vec3(Vec3::UnitZ());
+View view_of(const std::vector<Vec3f>& points, const Pose& camera_from_points, int size_px) {
+  Vec3 middle = Vec3::Zero();
+  for (const Vec3f& p : points) middle += camera_from_points * p.cast<double>();
+  middle /= std::max<std::size_t>(1, points.size());
+  const Vec3 ray = middle.norm() > 1 ? Vec3(middle.normalized()) : Vec3(Vec3::UnitZ());
   const Matrix3 turn = rotation_from_vector(Vec3(0, -14 * kDegree, 0)) * rotation_from_vector(Vec3(24 * kDegree, 0, 0));
-  View view = view_along(turn * ray, Vec3::UnitY(), center, 1, size_px, size_px);
-  double reach = 0;
-  for (int corner = 0; corner < 8; ++corner) {
-    const Vec3 p((corner & 1 ? high : low).x(), (corner & 2 ? high : low).y(), (corner & 4 ? high : low).z());
-    const Vec3 v = view.view_from_world * (camera_from_part * p - center);
-    reach = std::max({reach, std::abs(v.x()), std::abs(v.y())});
+  View view = view_along(turn * ray, Vec3::UnitY(), middle, 1, size_px, size_px);
+  Vec3 low = Vec3::Constant(1e300), high = Vec3::Constant(-1e300);
+  for (const Vec3f& p : points) {
+    const Vec3 v = view.view_from_world * (camera_from_points * p.cast<double>() - middle);
+    low = low.cwiseMin(v);
+    high = high.cwiseMax(v);
   }
-  view.px_per_mm = size_px / (2 * reach * margin);
+  view.center += view.view_from_world.transpose() * (0.5 * (low + high));
+  const double extent = std::max({1e-6, high.x() - low.x(), high.y() - low.y()});
+  view.px_per_mm = size_px / (1.06 * extent);
   return view;
 }
 
@@ -66,7 +70,7 @@ std::vector<PeakMark> marks(const Primitives& primitives, const Sighting& where,
     const Primitive& p = primitives.items[k];
     if (p.type != type || out.size() >= most) continue;
     const auto same = std::find_if(out.begin(), out.end(), [&](const PeakMark& m) {
-      return std::abs(m.direction.dot(p.axis)) > std::cos(6 * kDegree);  // one ring for parallel ones
+      return std::abs(m.direction.dot(p.axis)) > std::cos(10 * kDegree);  // one ring for those that would overlap
     });
     if (same == out.end()) out.push_back({p.axis, (type == PrimitiveType::plane ? "P" : "C") + std::to_string(p.id)});
   }
@@ -209,7 +213,7 @@ std::string ten_pictures(const Observation& seen, const Part& part, const Instan
   const Pose& pose = instance->camera_from_part;
   const Sighting where = sighting_of(seen.scan, seen.surfels, seen.primitives, part, pose);
   const Labels labels{label_pixels(seen.primitives, seen.surfels), seen.primitives.items};
-  const View view = view_of_box(part.box_min, part.box_max, pose, size_px, 1.06);
+  const View view = view_of(part.mesh.vertices, pose, size_px);
 
   Canvas posed(view);
   Sighting around = where;
@@ -230,12 +234,7 @@ std::string ten_pictures(const Observation& seen, const Part& part, const Instan
 std::string scan_pictures(const Observation& seen, int size_px) {
   const Sighting where = whole_scan(seen.scan, seen.surfels, seen.primitives);
   const Labels labels{label_pixels(seen.primitives, seen.surfels), seen.primitives.items};
-  Vec3 low = Vec3::Constant(1e300), high = Vec3::Constant(-1e300);
-  for (const Vec3f& p : seen.surfels.position) {
-    low = low.cwiseMin(p.cast<double>());
-    high = high.cwiseMax(p.cast<double>());
-  }
-  const View view = view_of_box(low, high, Pose::Identity(), size_px, 1.02);
+  const View view = view_of(seen.surfels.position, Pose::Identity(), size_px);
   return space_pictures(seen, where, "the scan") + scan_solids(seen, where, view, labels, 0);
 }
 
@@ -244,7 +243,7 @@ std::string part_pictures(const Part& part, int size_px) {
   pose.linear() = rotation_from_vector(Vec3(90 * kDegree, 0, 0));
   pose.linear() = rotation_from_vector(Vec3(0, 0, 30 * kDegree)) * pose.linear();
   pose.translation() = Vec3(0, 0, 10 * part.diameter_mm) - pose.linear() * part.box_center();
-  return cad_solids(part, pose, view_of_box(part.box_min, part.box_max, pose, size_px, 1.06), 0);
+  return cad_solids(part, pose, view_of(part.mesh.vertices, pose, size_px), 0);
 }
 
 std::string picture_legend() {

@@ -86,11 +86,10 @@ std::string poses_section(const Scan& scan, std::span<const Part> parts, const F
     const Pose pose = scan.input_from_camera * instance.camera_from_part;
     const Vec3 t = pose.translation(), r = yaskawa_angles(Matrix3(pose.linear())) / kDegree;
     const PoseSigma sigma = pose_sigma(instance, part < 0 ? Vec3(Vec3::Zero()) : parts[part].box_center());
-    const int mm = decimals_for(sigma.translation_mm), deg = decimals_for(sigma.rotation / kDegree);
     out += "<tr><td>" + named(parts, instance.part) + "</td>" + cell(number(instance.score, 3)) +
            cell(number(100 * instance.visible_fraction, 0) + unit("%"));
-    for (int k = 0; k < 3; ++k) out += cell(number(t[k], mm));
-    for (int k = 0; k < 3; ++k) out += cell(number(r[k], deg));
+    for (int k = 0; k < 3; ++k) out += cell(number(t[k], 3));
+    for (int k = 0; k < 3; ++k) out += cell(number(r[k], 3));
     out += cell(number(sigma.translation_mm, 3)) + cell(number(sigma.rotation / kDegree, 4));
     if (judged) {
       const auto match = std::find_if(judged->found.begin(), judged->found.end(),

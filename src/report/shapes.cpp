@@ -137,7 +137,7 @@ void draw_edges(Canvas& canvas, const Mesh& mesh, const std::vector<Edge>& edges
   std::vector<char> faces_viewer(mesh.triangles.size());
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
     faces_viewer[t] = (b_from_part.linear() * normal_of(mesh, t)).dot(viewer) < 0;
-  const double slack = 2.5 / canvas.view.px_per_mm;  // an edge is as deep as its pixel's neighbours, slopes included
+  const double slack = 1.5 / canvas.view.px_per_mm;  // an edge is as deep as its pixel's neighbours, slopes included
   const auto draw = [&](Material m, double width) {
     for (const Edge& edge : edges) {
       const bool silhouette = edge.right >= 0 && faces_viewer[edge.left] != faces_viewer[edge.right];

@@ -30,7 +30,8 @@ fs::path scene_dir(const fs::path& data, int scene) {
 std::vector<std::string> offered(const fs::path& scene, const std::vector<eval::Model>& models) {
   std::ifstream file(scene / "scene_parts.json");
   std::vector<std::string> out;
-  for (int id : nlohmann::json::parse(file).at("0")) out.push_back(models.at(id - 1).name);
+  const nlohmann::json ids = nlohmann::json::parse(file);
+  for (int id : ids.at("0")) out.push_back(models.at(id - 1).name);
   return out;
 }
 
@@ -65,7 +66,7 @@ int run(const fs::path& data, int first, int last) {
       rotations.push_back(m.error.rotation / kDegree);
       std::printf(" %.4f/%.4f", translations.back(), rotations.back());
     }
-    std::printf("  %.1f\n", times.back());
+    std::printf("  %.1f  %s\n", times.back(), found.status.c_str());
     for (const Reason& r : found.instances.rejected)
       if (judged.found.empty())
         std::printf("        %s: %s, %s: %.4g, limit %.4g, %d times\n", r.part.c_str(), r.stage.c_str(), r.test.c_str(),

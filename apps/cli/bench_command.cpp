@@ -1,0 +1,116 @@
+#include <cmath>
+#include <iostream>
+
+#include "commands.hpp"
+#include "output.hpp"
+#include "paper_tables.hpp"
+#include "progress.hpp"
+#include "tribin/core/error.hpp"
+#include "tribin/finder/finder.hpp"
+#ifdef TRIBIN_WITH_SIM
+#include "tribin/sim/paper_experiment.hpp"
+#endif
+
+namespace tribin::cli {
+namespace {
+
+struct Options {
+  std::vector<std::string> parts = {"examples/parts/alternator_a.step", "examples/parts/alternator_b.step"};
+  std::string json, unit = "mm";
+  int poses = 40;
+  int first = 1;
+  double noise_mm = 0.1, noise_correlation_px = 1;
+  bool no_times = false;
+};
+
+#ifdef TRIBIN_WITH_SIM
+/// The bound's sd of the box's centre [mm] and of the rotation [rad], as norms.
+void set_bound(PaperRun& run, const sim::PaperScene& scene, const Part& part, double correlation_px) {
+  const Matrix6 bound = sim::cramer_rao_bound(scene.simulated, 1, correlation_px);
+  const Vec3 arm = scene.camera_from_part.linear() * part.box_center();
+  Matrix3 minus_arm_cross;  // the centre moves by dt + w x arm
+  minus_arm_cross << 0, arm.z(), -arm.y(), -arm.z(), 0, arm.x(), arm.y(), -arm.x(), 0;
+  Eigen::Matrix<double, 3, 6> j;
+  j << Matrix3::Identity(), minus_arm_cross;
+  run.bound_translation_mm = std::sqrt((j * bound * j.transpose()).trace());
+  run.bound_rotation = std::sqrt(bound.bottomRightCorner<3, 3>().trace());
+}
+
+PaperRun run_one(const std::vector<Part>& parts, const std::vector<eval::Model>& models, std::size_t which,
+                 const std::vector<sim::StableRest>& rests, int seed, const Options& options) {
+  const sim::PaperScene scene =
+      sim::paper_scene(parts[which].mesh, rests, seed,
+                       {.noise_mm = options.noise_mm, .noise_correlation_px = options.noise_correlation_px});
+  const Found found = find_parts(scene.scan(), parts);  // both parts are offered each time
+  PaperRun run;
+  run.part = parts[which].name;
+  run.seed = seed;
+  run.times = found.times;
+  const std::vector<eval::Truth> truths = {{run.part, scene.camera_from_part, 1.0}};
+  const eval::Judgement judged = eval::judge(found.instances.items, truths, models);
+  run.class_right = !found.instances.items.empty() && found.instances.items.front().part == run.part;
+  run.found = !judged.found.empty();
+  run.false_answers = static_cast<int>(judged.false_answers.size());
+  if (run.found) run.error = judged.found.front().error;
+  try {
+    set_bound(run, scene, parts[which], options.noise_correlation_px);
+  } catch (const Error&) {
+    // A direction that no pixel holds: this pose has no bound, and is left out of the ratio.
+  }
+  return run;
+}
+
+int run(const Options& options, const Context& context) {
+  const std::vector<Part> parts = read_parts(part_arguments(options.parts), options.unit);
+  std::vector<eval::Model> models;
+  for (const Part& part : parts) models.push_back(eval::model_of(part));
+  std::vector<PaperRun> runs;
+  {
+    Progress progress("The paper's experiment", static_cast<int>(parts.size()) * options.poses, context.quiet);
+    for (std::size_t which = 0; which < parts.size(); ++which) {
+      const std::vector<sim::StableRest> rests = sim::stable_rests(parts[which].mesh);
+      for (int seed = options.first; seed < options.first + options.poses; ++seed) {
+        runs.push_back(run_one(parts, models, which, rests, seed, options));
+        progress.done(static_cast<int>(runs.size()));
+        if (context.verbose)
+          std::cerr << runs.back().part << " seed " << seed << (runs.back().found ? ": " : ": not found ")
+                    << runs.back().error.translation_mm << " mm, " << runs.back().error.rotation / kDegree << " deg\n";
+      }
+    }
+  }
+  if (!options.json.empty()) write_text(options.json, paper_json(runs, !options.no_times));
+  if (options.json != "-") std::cout << paper_tables(runs);
+  return 0;
+}
+#else
+int run(const Options&, const Context&) {
+  throw Error(ErrorCode::bad_option, "the simulated camera is not built in; install libembree-dev and build again");
+}
+#endif
+
+}  // namespace
+
+void add_bench(CLI::App& app, Context& context) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command = add_command(app, context, "bench", "The paper's experiment: its tables, ours beside them",
+                                  "tribin bench --poses 40");
+  command->add_option("--part", options->parts, "The two parts; default: the alternators of examples/parts")
+      ->type_name("[NAME=]CAD")
+      ->allow_extra_args(false);
+  command->add_option("--poses", options->poses, "Poses of each part")->check(CLI::Range(1, 100000))->type_name("N");
+  command->add_option("--first", options->first, "First seed; the poses take consecutive ones")
+      ->check(CLI::Range(1, 1000000000))
+      ->type_name("S");
+  command->add_option("--noise-mm", options->noise_mm, "Noise of a facing surface at 800 mm")
+      ->check(CLI::PositiveNumber)
+      ->type_name("X");
+  command->add_option("--noise-correlation-px", options->noise_correlation_px, "Its correlation")
+      ->check(CLI::Range(0.0, 5.0))
+      ->type_name("X");
+  command->add_option("--unit", options->unit, "Unit of CAD files that name none: mm, cm, m, inch")->type_name("U");
+  command->add_option("--json", options->json, "Write every run as JSON; - is stdout")->type_name("OUT|-");
+  command->add_flag("--no-times", options->no_times, "Leave the times out: same input, same bytes");
+  command->callback([options, &context] { context.run = [options, &context] { return run(*options, context); }; });
+}
+
+}  // namespace tribin::cli
