@@ -27,6 +27,7 @@ void add_segment(CLI::App& app, Context& context);
 void add_normals(CLI::App& app, Context& context);
 void add_part(CLI::App& app, Context& context);
 void add_convert(CLI::App& app, Context& context);
+void add_simulate(CLI::App& app, Context& context);
 void add_bench(CLI::App& app, Context& context);
 
 // Shared by the commands (inputs.cpp).

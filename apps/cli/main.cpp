@@ -64,6 +64,7 @@ int main(int argc, char** argv) {
   tribin::cli::add_normals(app, context);
   tribin::cli::add_part(app, context);
   tribin::cli::add_convert(app, context);
+  tribin::cli::add_simulate(app, context);
   tribin::cli::add_bench(app, context);
 
   constexpr int kBadOption = static_cast<int>(tribin::ErrorCode::bad_option);

@@ -16,7 +16,7 @@ import unittest
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 DATA = pathlib.Path(os.environ.get("TRIBIN_DATA", ROOT / "../shared/data"))
 SCENES = DATA / "scenes_dev"
-COMMANDS = ["locate", "segment", "normals", "part", "convert"]
+COMMANDS = ["locate", "segment", "normals", "part", "convert", "simulate", "bench"]
 TRIBIN, WORK = sys.argv[1], pathlib.Path(sys.argv[2])
 
 
