@@ -146,7 +146,7 @@ class LocateCommand(unittest.TestCase):
         process.send_signal(signal.SIGINT)
         code = process.wait(60)
         left = sorted(p.name for p in target.iterdir())
-        self.assertIn(code, (0, 130))
+        self.assertIn(code, (0, 130, -signal.SIGINT))  # the last: it was still being loaded
         self.assertTrue(set(left) <= {"result.json", "report"}, left)
 
 
