@@ -95,6 +95,7 @@ Instances recognize(const Primitives& primitives, const PrimitiveModel& observat
   CellMask claimed;
   for (std::size_t i = 0; i < candidates.size(); ++i) {
     if (done[i]) continue;
+    if (candidates[i].verification.gain <= 0) break;  // more speaks against it and all that follow than for them
     if (masks[i].count == 0 || overlap(claimed, masks[i]) > kOverlap) {
       done[i] = true;
       add_reason(out.rejected, {parts[static_cast<std::size_t>(candidates[i].part)].name, "selection", "overlap",
