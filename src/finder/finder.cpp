@@ -61,6 +61,8 @@ Found find_parts(const Scan& scan, std::span<const Part> parts, const FinderOpti
   if (!segmentation.radii_mm.empty())
     surfel.max_radius_mm = static_cast<float>(*std::max_element(segmentation.radii_mm.begin(), segmentation.radii_mm.end()));
 
+  segmentation.boundaries = false;  // nothing below reads them
+
   {
     const StageTimer timer(found.times, "surface_normals");
     found.surfels = surfels_from_scan(scan, surfel);

@@ -46,16 +46,22 @@ Indices seed_of(const Surfels& s, const Indices& component) {
                             [&](std::uint32_t a, std::uint32_t b) { return s.area_mm2[a] < s.area_mm2[b]; })};
 }
 
-std::optional<FoundSurface> explain_plane(Scene& scene, const Indices& whole, PlaneVoters voters, const Limits& limits) {
+std::optional<FoundSurface> explain_plane(Scene& scene, const Indices& whole, PlaneVoters voters,
+                                          const Limits& limits) {
   const Indices component = seed_of(scene.surfels, whole);
   Fit fit = fit_plane(scene.surfels, component);
   if (!fit.valid) return std::nullopt;
   FoundSurface out;
+  std::size_t before = 0;
   for (int round = 0; round < 3; ++round) {
     out.support = grow(scene, fit.surface, component, fit.scale, kPlaneSlack);
     if (out.support.size() < limits.min_surfels) return std::nullopt;
     fit = fit_plane(scene.surfels, out.support);
     if (!fit.valid) return std::nullopt;
+    // What a large plane takes up hardly changes after the first time.
+    const std::size_t change = std::max(before, out.support.size()) - std::min(before, out.support.size());
+    if (change * 200 < out.support.size()) break;
+    before = out.support.size();
   }
   // The support must hold the plane's direction: strips one cell wide do not.
   if (scene.surfels.mesh == nullptr && std::sqrt(fit.covariance.topLeftCorner<2, 2>().trace()) > 3.0 * kDegree)

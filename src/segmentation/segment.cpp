@@ -66,7 +66,6 @@ Primitive primitive_of(const Surfels& s, FoundSurface& found) {
   p.radius_from_cad = found.radius_from_cad;
   p.covariance = found.fit.covariance;
   p.peak = found.peak;
-  std::sort(found.support.begin(), found.support.end());
   p.surfels = found.support;
   p.area_mm2 = area_of(s, found.support);
   p.rms_mm = rms_mm(s, found.support, surface);
@@ -135,11 +134,14 @@ Primitives segment(const Surfels& surfels, const SegmentationOptions& options) {
     if (found.size() == before) break;
   }
 
-  // Largest first.
+  // Supports in order of their surfels, by one pass over the labels; then the largest first.
+  for (FoundSurface& f : found) f.support.clear();
+  for (std::uint32_t i = 0; i < scene.label.size(); ++i)
+    if (scene.label[i] > 0) found[static_cast<std::size_t>(scene.label[i] - 1)].support.push_back(i);
   for (FoundSurface& f : found) out.items.push_back(primitive_of(surfels, f));
   std::stable_sort(out.items.begin(), out.items.end(),
                    [](const Primitive& a, const Primitive& b) { return a.area_mm2 > b.area_mm2; });
-  if (surfels.scan != nullptr) {
+  if (surfels.scan != nullptr && options.boundaries) {
     parallel_each(static_cast<int>(out.items.size()), [&](int i) {
       Primitive& p = out.items[static_cast<std::size_t>(i)];
       if (p.type == PrimitiveType::plane) p.loops = plane_boundaries(p, surfels);

@@ -31,7 +31,7 @@ std::optional<RoundCandidate> settle(Scene& scene, const Indices& component, con
     if (!c.fit.valid || c.fit.surface.radius > limits.max_radius_mm) return std::nullopt;
     c.support = grow(scene, c.fit.surface, component, c.fit.scale, kRoundSlack);
     if (c.support.size() < limits.min_surfels) return std::nullopt;
-    options.max_surfels = round == 0 ? 600 : 4000;
+    options.max_surfels = round == 0 ? 600 : 1500;
     c.fit = fit_round(scene.surfels, c.support, c.fit.surface, options);
   }
   if (!c.fit.valid) return std::nullopt;
@@ -45,7 +45,7 @@ void polish(const Scene& scene, RoundCandidate& c) {
   options.hold_radius = c.from_cad;
   options.cone = c.fit.surface.type == PrimitiveType::cone;
   options.raw_pixels = true;
-  options.max_surfels = 8000;  // pixels: 2 ms, and within twice the bound of all of a large face's
+  options.max_surfels = 3000;  // pixels: under correlated noise more of them say little more
   const Fit fine = fit_round(scene.surfels, c.support, c.fit.surface, options);
   if (!fine.valid || std::abs(fine.surface.radius - c.fit.surface.radius) > 0.1 * c.fit.surface.radius) return;
   c.fit.surface = fine.surface;
@@ -148,6 +148,7 @@ std::optional<FoundSurface> explain_round(Scene& scene, const Indices& component
   // Taper by positions: a cone must not be called a cylinder.
   FitOptions taper;
   taper.cone = true;
+  taper.max_surfels = 1500;
   if (!best->from_cad) {
     Fit cone = fit_round(s, best->support, best->fit.surface, taper);
     const double sigma = std::sqrt(cone.covariance(5, 5));

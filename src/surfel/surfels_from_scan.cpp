@@ -153,18 +153,28 @@ Curvature curvature_of(const Vec3& ray, double w, double wx, double wy, const do
   const double s11 = -scale * second[0] * p1 * p1;
   const double s12 = -scale * p1 * (second[0] * q1 + second[1] * q2);
   const double s22 = -scale * (second[0] * q1 * q1 + 2 * second[1] * q1 * q2 + second[2] * q2 * q2);
-  const double middle = 0.5 * (s11 + s22), half = std::hypot(0.5 * (s11 - s22), s12);
-  double angle = 0.5 * std::atan2(2 * s12, s11 - s22);  // of the direction of the algebraically larger one
+  const double middle = 0.5 * (s11 + s22), skew = 0.5 * (s11 - s22), half = std::sqrt(skew * skew + s12 * s12);
+  // Direction of the algebraically larger one: half the angle of (skew, s12), by the half-angle formulas.
+  double c = 1, sn = 0;
+  if (half > 0) {
+    c = std::sqrt(std::max(0.0, 0.5 * (1 + std::abs(skew) / half)));
+    sn = 0.5 * s12 / (half * c);
+    if (skew < 0) {
+      std::swap(c, sn);
+      if (c < 0) c = -c, sn = -sn;
+    }
+  }
   Curvature k;
   k.k1 = middle + half;
   k.k2 = middle - half;
   if (std::abs(k.k2) > std::abs(k.k1)) {
     std::swap(k.k1, k.k2);
-    angle += 0.5 * kPi;
+    std::swap(c, sn);
+    c = -c;
   }
   const Vec3 t1 = tx * p1, t2 = tx * q1 + ty * q2;
-  k.direction2 = (-std::sin(angle) * t1 + std::cos(angle) * t2).normalized();
-  const double a = std::cos(angle) * p1 + std::sin(angle) * q1, b = std::sin(angle) * q2;  // direction 1 in parameters
+  k.direction2 = (-sn * t1 + c * t2).normalized();
+  const double a = c * p1 + sn * q1, b = sn * q2;  // direction 1 in parameters
   k.sigma = scale * std::sqrt((a * a * a * a + b * b * b * b) * variance[0] + 4 * a * a * b * b * variance[1]);
   return k;
 }

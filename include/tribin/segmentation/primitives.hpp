@@ -82,6 +82,7 @@ struct Primitives {
 struct SegmentationOptions {
   std::vector<double> radii_mm;   ///< radii to expect (from the CAD); empty = free radii only
   double min_area_mm2 = 0;        ///< smallest support; 0 = 30 cells' worth
+  bool boundaries = true;         ///< scan: trace the rims and holes of planes
 };
 
 /// Finds planes, cylinders, cones and spheres by going back and forth between IJK space, parameter space and 3-D space
