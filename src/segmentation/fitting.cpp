@@ -20,7 +20,8 @@ struct Row {
   Column jacobian;
 };
 
-Row linearise(const Surface& s, const Vec3& u, const Vec3& v, const Vec3& p) {
+/// \param c, sn  cosine and sine of the half angle.
+Row linearise(const Surface& s, const Vec3& u, const Vec3& v, double c, double sn, const Vec3& p) {
   Row row{0, Column::Zero()};
   const Vec3 q = p - s.point;
   if (s.type == PrimitiveType::sphere) {
@@ -34,8 +35,6 @@ Row linearise(const Surface& s, const Vec3& u, const Vec3& v, const Vec3& p) {
   const Vec3 across = q - s.axis * t;
   const double r = across.norm();
   const Vec3 e = across / std::max(r, 1e-9);
-  const bool cone = s.half_angle != 0;
-  const double c = cone ? std::cos(s.half_angle) : 1.0, sn = cone ? std::sin(s.half_angle) : 0.0;
   const double eu = e.dot(u), ev = e.dot(v);
   row.residual = (r - s.radius) * c - t * sn;
   // A tilt w moves the axis by w x a: about u by -v, about v by +u. The distance from the axis changes by -t (e . da),
@@ -306,13 +305,16 @@ Fit fit_round(const Surfels& surfels, std::span<const std::uint32_t> support, co
     h.setZero();
     g.setZero();
     double cost = 0;
+    const double c = std::cos(at.half_angle), sn = std::sin(at.half_angle);
     const int used = options.cone ? kParameters : kParameters - 1;
     for (std::size_t i = 0; i < data.points.size(); ++i) {
-      const Row row = linearise(at, u, v, data.points[i]);
+      const Row row = linearise(at, u, v, c, sn, data.points[i]);
       const double e = row.residual * data.inverse_sigma[i];
       const double weight = robust_weight(e, mu) * data.inverse_sigma[i] * data.inverse_sigma[i];
-      for (int a = 0; a < used; ++a)
-        for (int b = 0; b <= a; ++b) h(a, b) += weight * row.jacobian[a] * row.jacobian[b];
+      for (int b = 0; b < used; ++b) {
+        const double part = weight * row.jacobian[b];
+        for (int a = b; a < used; ++a) h(a, b) += part * row.jacobian[a];  // columns lie together
+      }
       g += weight * row.residual * row.jacobian;
       cost += mu * mu * e * e / (mu * mu + e * e);
     }

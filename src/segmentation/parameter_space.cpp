@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "segmentation/spaces.hpp"
+#include "tribin/core/parallel.hpp"
 
 namespace tribin::segmentation_detail {
 namespace {
@@ -69,6 +70,36 @@ std::vector<float> vote_rulings(const Scene& scene, const std::vector<Ruled>& ru
   return total;
 }
 
+/// What explains each component, all seen with the labels as they are now: the heavy part of a peak, in parallel.
+/// Ranges depend on the number of components alone.
+std::vector<std::optional<FoundSurface>> explain_each(const Scene& scene, const std::vector<Indices>& components,
+                                                      const Vec3& axis, const Limits& limits) {
+  std::vector<std::optional<FoundSurface>> out(components.size());
+  const int count = static_cast<int>(components.size());
+  parallel_ranges(count, 1 + count / 16, [&](int begin, int end) {
+    Scene own = scene.fork();
+    for (int c = begin; c < end; ++c)
+      out[static_cast<std::size_t>(c)] = explain_round(own, components[static_cast<std::size_t>(c)], axis, limits);
+  });
+  return out;
+}
+
+/// Whether an explanation made ahead is still the right one after others of its peak were taken: its surfels are free;
+/// or it was none, and nothing that touches the component was taken.
+bool still_holds(const Scene& scene, const Indices& component, const std::optional<FoundSurface>& ahead,
+                 std::size_t found_before) {
+  const Surfels& s = scene.surfels;
+  if (ahead)
+    return std::all_of(ahead->support.begin(), ahead->support.end(), [&](std::uint32_t i) { return scene.free(i); });
+  const auto taken = [&](std::uint32_t i) { return scene.label[i] > static_cast<std::int32_t>(found_before); };
+  for (std::uint32_t i : component) {
+    if (taken(i)) return false;
+    for (std::uint32_t k = s.neighbour_begin[i]; k < s.neighbour_begin[i + 1]; ++k)
+      if (taken(s.neighbours[k])) return false;
+  }
+  return true;
+}
+
 }  // namespace
 
 void find_cylinders(Scene& scene, const Limits& limits, HoughSpaces& spaces, std::vector<FoundSurface>& found) {
@@ -110,26 +141,31 @@ void find_cylinders(Scene& scene, const Limits& limits, HoughSpaces& spaces, std
     peak.parameter_space = true;
     peak.direction = axis;
     peak.votes = gathered;
-    bool any = false;
+    std::vector<Indices> all;
     for (int side = 0; side < 2; ++side) {  // convex and concave surfaces may touch: never one component
       Indices one_side;
       for (std::uint32_t i : members)
         if ((s.curvature1[i] > 0) == (side == 0)) one_side.push_back(i);
-      for (const Indices& component : components(scene, one_side, least)) {
-        Indices left = component;
-        // A component may hold several cylinders: take the best, go on with the rest.
-        while (left.size() >= least) {
-          std::optional<FoundSurface> next = explain_round(scene, left, axis, limits);
-          if (!next) break;
-          next->peak = static_cast<int>(spaces.peaks.size());
-          take(scene, found, std::move(*next));
-          any = true;
-          std::erase_if(left, [&](std::uint32_t i) { return !scene.free(i); });
-          const std::vector<Indices> parts = components(scene, left, least);
-          left = parts.empty() ? Indices{} : parts.front();
-        }
+      for (Indices& component : components(scene, one_side, least)) all.push_back(std::move(component));
+    }
+    std::vector<std::optional<FoundSurface>> first = explain_each(scene, all, axis, limits);
+    const std::size_t found_before = found.size();
+    for (std::size_t c = 0; c < all.size(); ++c) {
+      Indices& left = all[c];
+      bool ahead = still_holds(scene, left, first[c], found_before);
+      // A component may hold several cylinders: take the best, go on with the rest.
+      while (left.size() >= least) {
+        std::optional<FoundSurface> next = ahead ? std::move(first[c]) : explain_round(scene, left, axis, limits);
+        ahead = false;
+        if (!next) break;
+        next->peak = static_cast<int>(spaces.peaks.size());
+        take(scene, found, std::move(*next));
+        std::erase_if(left, [&](std::uint32_t i) { return !scene.free(i); });
+        const std::vector<Indices> parts = components(scene, left, least);
+        left = parts.empty() ? Indices{} : parts.front();
       }
     }
+    const bool any = found.size() > found_before;
     if (any) spaces.peaks.push_back(peak);
     if (members.empty()) break;
     std::size_t at = 0;  // members are in the order of `ruled`

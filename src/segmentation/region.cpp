@@ -28,12 +28,18 @@ void around(const Surfels& s, std::uint32_t i, Visit&& visit, Bridge&& bridge) {
 
 }  // namespace
 
-Scene::Scene(const Surfels& s) : surfels(s), label(s.size(), 0), mark(s.size(), 0) {
+Scene::Scene(const Surfels& s) : surfels(s), mark(s.size(), 0), labels_(s.size(), 0) {
+  label = labels_;
   std::vector<float> areas(s.area_mm2);
   if (areas.empty()) return;
   std::nth_element(areas.begin(), areas.begin() + static_cast<std::ptrdiff_t>(areas.size() / 2), areas.end());
   cell_mm = std::sqrt(areas[areas.size() / 2]);
 }
+
+Scene::Scene(const Scene* of)
+    : surfels(of->surfels), label(of->label), mark(of->mark.size(), 0), cell_mm(of->cell_mm) {}
+
+Scene Scene::fork() const { return Scene(this); }
 
 std::vector<Indices> components(Scene& scene, std::span<const std::uint32_t> members, std::size_t least) {
   const Surfels& s = scene.surfels;

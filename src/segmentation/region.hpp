@@ -11,13 +11,21 @@ namespace tribin::segmentation_detail {
 /// The surfels and what explains them so far; the scratch marks save an allocation per region.
 struct Scene {
   const Surfels& surfels;
-  std::vector<std::int32_t> label;  ///< id of the primitive, 0 = still free
+  std::span<std::int32_t> label;  ///< id of the primitive, 0 = still free
   std::vector<std::uint32_t> mark;
   std::uint32_t tick = 0;
   double cell_mm = 0;  ///< typical spacing of surfels, for gaps: sqrt of the median area
 
   explicit Scene(const Surfels& s);
+  /// The same labels with marks of its own, for a task that only reads labels. Must not outlive this one.
+  Scene fork() const;
+  Scene(const Scene&) = delete;
+  Scene& operator=(const Scene&) = delete;
   bool free(std::uint32_t i) const { return label[i] == 0; }
+
+ private:
+  explicit Scene(const Scene* of);
+  std::vector<std::int32_t> labels_;
 };
 
 /// Connected components of `members`, largest first. Components bridge one rejected cell where both sides lie on one

@@ -138,7 +138,10 @@ Primitives segment(const Surfels& surfels, const SegmentationOptions& options) {
   for (FoundSurface& f : found) f.support.clear();
   for (std::uint32_t i = 0; i < scene.label.size(); ++i)
     if (scene.label[i] > 0) found[static_cast<std::size_t>(scene.label[i] - 1)].support.push_back(i);
-  for (FoundSurface& f : found) out.items.push_back(primitive_of(surfels, f));
+  out.items.resize(found.size());
+  parallel_each(static_cast<int>(found.size()), [&](int i) {
+    out.items[static_cast<std::size_t>(i)] = primitive_of(surfels, found[static_cast<std::size_t>(i)]);
+  });
   std::stable_sort(out.items.begin(), out.items.end(),
                    [](const Primitive& a, const Primitive& b) { return a.area_mm2 > b.area_mm2; });
   if (surfels.scan != nullptr && options.boundaries) {

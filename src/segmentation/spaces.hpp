@@ -41,7 +41,8 @@ void find_cones_and_spheres(Scene& scene, const Limits& limits, std::vector<Foun
 
 /// One component -> the cylinder (or cone) that explains most of it, if it passes all tests. \param axis near the
 /// truth.
-std::optional<FoundSurface> explain_round(Scene& scene, const Indices& component, const Vec3& axis, const Limits& limits);
+std::optional<FoundSurface> explain_round(Scene& scene, const Indices& component, const Vec3& axis,
+                                          const Limits& limits);
 
 /// Arc of the support about the surface's axis [rad]: the circle less its largest gap.
 double arc_of(const Surfels& surfels, const Indices& support, const Surface& surface);

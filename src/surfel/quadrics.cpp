@@ -5,6 +5,13 @@
 
 #include "tribin/core/parallel.hpp"
 
+// Sums of whole rows, lane by lane and never fused: each level gives the same bytes.
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_THREAD__)
+#define TRIBIN_VECTOR_LEVELS __attribute__((target_clones("avx2", "default")))
+#else
+#define TRIBIN_VECTOR_LEVELS
+#endif
+
 namespace tribin::surfel_detail {
 namespace {
 
@@ -34,8 +41,8 @@ struct RowSums {
   explicit RowSums(std::size_t n) : w0(n), w1(n), w2(n), a0(n), a1(n), b0(n), b1(n), valid(n) {}
 };
 
-void sum_row(const float* w, const float* a, const float* b, const float* ok, int columns, int half, RowSums& out,
-             std::size_t at) {
+TRIBIN_VECTOR_LEVELS void sum_row(const float* w, const float* a, const float* b, const float* ok, int columns,
+                                  int half, RowSums& out, std::size_t at) {
   const auto clear = [&](std::vector<float>& v) { std::fill_n(v.data() + at, columns, 0.0f); };
   for (auto* v : {&out.w0, &out.w1, &out.w2, &out.a0, &out.a1, &out.b0, &out.b1, &out.valid}) clear(*v);
   float* __restrict w0 = out.w0.data() + at;
@@ -75,7 +82,7 @@ struct Workspace {
   }
 };
 
-void add_row(const RowSums& sums, std::size_t at, int columns, float f, Workspace& k) {
+TRIBIN_VECTOR_LEVELS void add_row(const RowSums& sums, std::size_t at, int columns, float f, Workspace& k) {
   const float ff = f * f;
   const float *w0 = sums.w0.data() + at, *w1 = sums.w1.data() + at, *w2 = sums.w2.data() + at;
   const float *a0 = sums.a0.data() + at, *a1 = sums.a1.data() + at;
@@ -99,7 +106,7 @@ void add_row(const RowSums& sums, std::size_t at, int columns, float f, Workspac
   }
 }
 
-void solve_row(const Moments& m, int columns, Workspace& k) {
+TRIBIN_VECTOR_LEVELS void solve_row(const Moments& m, int columns, Workspace& k) {
   const float s = m.s;
   const float d = m.m4 + 4 * s * m.m2;
   const float inverse_linear = 1.0f / (m.m2 + s * m.m0);
@@ -120,7 +127,7 @@ void solve_row(const Moments& m, int columns, Workspace& k) {
   }
 }
 
-void add_misfit(const float* w, int columns, int half, float j, Workspace& k) {
+TRIBIN_VECTOR_LEVELS void add_misfit(const float* w, int columns, int half, float j, Workspace& k) {
   for (int i = -half; i <= half; ++i) {
     const float f = static_cast<float>(i), ff = f * f, fj = f * j, jj = j * j;
     for (int x = half; x < columns - half; ++x) {
