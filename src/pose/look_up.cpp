@@ -72,6 +72,8 @@ void look(const SceneDepth& scene, const FastPose& pose, const Vec3f& point, con
     ++out.violated;
   } else if (r < -tolerance) {
     ++out.occluded;
+  } else if (scene.is_background(p.u, p.v)) {
+    ++out.background;
   } else {
     const Vec3f m = scene.normal(p.u, p.v);
     const float agree = m[0] * n[0] + m[1] * n[1] + m[2] * n[2];

@@ -144,47 +144,51 @@ std::vector<PoseCandidate> sift(const SceneDepth& scene, const Part& part, int p
   coarse = best_apart(part, std::move(coarse), 160, 0.05 * part.diameter_mm, 14 * kDegree);
   std::vector<Scored> settled = settle(scene, part, std::move(coarse));
   settled = best_apart(part, std::move(settled), 24, 0.02 * part.diameter_mm, 6 * kDegree);
+  // Far behind the best of the whole scan is not worth a rendering.
+  std::erase_if(settled, [best = settled.empty() ? 0 : settled[0].score](const Scored& x) { return x.score < 0.5 * best; });
 
   std::vector<PoseCandidate> out(settled.size());
   parallel_each(static_cast<int>(settled.size()), [&](int i) {
     const auto k = static_cast<std::size_t>(i);
     PoseCandidate& c = out[k];
     c.part = part_index;
-    const int step = step_for(part, scene, settled[k].pose, 1500);
+    const int step = step_for(part, scene, settled[k].pose, 1000);
     const double start = std::max(0.012 * part.diameter_mm, noise_tolerance(scene));
     c.camera_from_part =
-        refine_pose(part.render_mesh, scene, settled[k].pose, refine_options(part, step, 6, start)).camera_from_part;
+        refine_pose(part.render_mesh, scene, settled[k].pose, refine_options(part, step, 4, start)).camera_from_part;
     c.verification = verify_pose(part.render_mesh, scene, c.camera_from_part,
                                  verification_options(part, step, 0.004 * part.diameter_mm));
   });
   std::stable_sort(out.begin(), out.end(), [](const PoseCandidate& a, const PoseCandidate& b) {
     return a.verification.gain > b.verification.gain;
   });
-  return out;
+  // Several starts that ended in one pose are one candidate.
+  std::vector<PoseCandidate> distinct;
+  for (const PoseCandidate& c : out)
+    if (std::none_of(distinct.begin(), distinct.end(), [&](const PoseCandidate& d) {
+          return close_poses(part, c.camera_from_part, d.camera_from_part, 0.015 * part.diameter_mm, 3 * kDegree);
+        }))
+      distinct.push_back(c);
+  return distinct;
 }
 
 }  // namespace
 
-std::vector<PoseCandidate> find_candidates(const SceneFeatures& features, const SceneDepth& scene, const Part& part,
-                                       int part_index, std::vector<Reason>& rejected) {
+std::vector<PoseCandidate> find_candidates(const SceneFeatures& features, SceneDepth& scene, const Part& part, int part_index,
+                                           Source source, std::vector<Reason>& rejected) {
+  scene.background = background_cells(features, part);
   std::vector<Pose> poses;
-  hypotheses_from_pairs(features, part, poses);
-  hypotheses_from_cylinders(features, part, poses);
-  hypotheses_from_planes(features, part, poses);
-  std::vector<PoseCandidate> out = sift(scene, part, part_index, poses, poses.size(), rejected);
-  // Regions and the sweep cost more than they bring where primitives already led to a pose that fits.
-  const auto fits = [](const PoseCandidate& c) { return c.verification.fit() > 0.5 && c.verification.contour() > 0.5; };
-  for (const auto& generate : {hypotheses_from_regions, hypotheses_from_sweep}) {
-    if (std::any_of(out.begin(), out.end(), fits)) break;
-    poses.clear();
-    generate(features, part, poses);
-    const std::vector<PoseCandidate> more = sift(scene, part, part_index, poses, 0, rejected);
-    out.insert(out.end(), more.begin(), more.end());
+  if (source == Source::primitives) {
+    hypotheses_from_pairs(features, part, poses);
+    hypotheses_from_cylinders(features, part, poses);
+    hypotheses_from_planes(features, part, poses);
+    return sift(scene, part, part_index, poses, poses.size(), rejected);
   }
-  std::stable_sort(out.begin(), out.end(), [](const PoseCandidate& a, const PoseCandidate& b) {
-    return a.verification.gain > b.verification.gain;
-  });
-  return out;
+  if (source == Source::regions)
+    hypotheses_from_regions(features, part, poses);
+  else
+    hypotheses_from_sweep(features, part, poses);
+  return sift(scene, part, part_index, poses, 0, rejected);
 }
 
 }  // namespace tribin

@@ -27,9 +27,13 @@ int step_for(const Part& part, const SceneDepth& scene, const Pose& camera_from_
 VerificationOptions verification_options(const Part& part, int step_px, double tolerance_mm);
 RefineOptions refine_options(const Part& part, int step_px, int iterations, double start_scale_mm);
 
-/// All candidates of one part in the scan, best evidence first.
-std::vector<PoseCandidate> find_candidates(const SceneFeatures& features, const SceneDepth& scene, const Part& part,
-                                       int part_index, std::vector<Reason>& rejected);
+/// Where hypotheses come from, cheapest and surest first.
+enum class Source { primitives, regions, sweep };
+
+/// The candidates of one part in what is not explained yet, best evidence first.
+/// \param scene  its `background` is set for this part.
+std::vector<PoseCandidate> find_candidates(const SceneFeatures& features, SceneDepth& scene, const Part& part, int part_index,
+                                           Source source, std::vector<Reason>& rejected);
 
 /// Do two poses of one part mean the same placing, up to the look-up's coarse steps?
 bool close_poses(const Part& part, const Pose& a, const Pose& b, double distance_mm, double angle);

@@ -6,13 +6,14 @@
 #include <numeric>
 
 #include "tribin/core/parallel.hpp"
+#include "tribin/pose/look_up.hpp"
 
 namespace tribin {
 namespace {
 
 // Pixels that a polished pose is fitted and compared on: enough for 0.1 sigma of any mean, a few ms a pose.
-constexpr double kPolishPixels = 6000;
-constexpr double kCompareFew = 1500;
+constexpr double kPolishPixels = 4000;
+constexpr double kCompareFew = 1000;
 // Poses that a comparison leaves within so many nats are compared again on all pixels.
 constexpr double kDecidePixels = 40000;
 constexpr double kUndecided = 30;
@@ -53,7 +54,15 @@ void add_spins(const SceneDepth& scene, const Part& part, const Pose& pose, std:
 /// Poses that the part's own shape confuses with this one.
 std::vector<Pose> rivals(const SceneDepth& scene, const Part& part, const Pose& pose) {
   std::vector<Pose> out;
-  for (const SelfSimilarPose& s : part.self_similar) out.push_back(pose * s.part_from_part);
+  const double tolerance = std::max(0.02 * part.diameter_mm, 4 * scene.median_sigma_mm);
+  const auto score = [&](const Pose& p) {
+    const PartView& view = view_of(part, p);
+    return look_up(scene, p, view.points, view.normals, 256, tolerance).score();
+  };
+  // A rival that a few looks already put far behind is none.
+  const double own = score(pose);
+  for (const SelfSimilarPose& s : part.self_similar)
+    if (const Pose other = pose * s.part_from_part; score(other) > own - 0.3) out.push_back(other);
   add_spins(scene, part, pose, out);
   return out;
 }
@@ -65,7 +74,7 @@ struct Finalist {
 
 /// Refines every pose at a render step and sorts them by likelihood, best first.
 void compare(const SceneDepth& scene, const Part& part, int step, std::vector<Finalist>& finalists) {
-  RefineOptions options = refine_options(part, step, 6, std::max(0.012 * part.diameter_mm, 4 * scene.median_sigma_mm));
+  RefineOptions options = refine_options(part, step, 5, std::max(0.012 * part.diameter_mm, 4 * scene.median_sigma_mm));
   options.outlines = true;
   parallel_each(static_cast<int>(finalists.size()), [&](int i) {
     Finalist& f = finalists[static_cast<std::size_t>(i)];
@@ -188,7 +197,7 @@ Polished polish(const SceneDepth& scene, std::span<const Part> parts, const Pose
   for (const Verification& v : checks) best = std::max(best, v.gain);
   std::vector<std::size_t> keep;
   for (std::size_t k = 0; k < poses.size(); ++k)
-    if (k == 0 || checks[k].gain > 0.7 * best) keep.push_back(k);
+    if (k == 0 || checks[k].gain > 0.85 * best) keep.push_back(k);
   std::stable_sort(keep.begin(), keep.end(), [&](std::size_t a, std::size_t b) { return checks[a].gain > checks[b].gain; });
   if (keep.size() > 12) keep.resize(12);
 

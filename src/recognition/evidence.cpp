@@ -30,7 +30,7 @@ int most_voted(const std::vector<std::int32_t>& votes) {
 void describe_evidence(const Part& part, const SceneDepth& scene, const SceneFeatures& features, Instance& instance) {
   const std::size_t count = part.model.primitives.size();
   std::vector<Fit> fits(count);
-  for (Fit& f : fits) f.scan_votes.assign(features.features.size() + 1, 0);
+  for (Fit& f : fits) f.scan_votes.assign(features.primitives->items.size() + 1, 0);
   const Pose& pose = instance.camera_from_part;
   IndexRender render;
   const int step = step_for(part, scene, pose, 20000);

@@ -23,7 +23,11 @@ struct SceneFeatures {
   const PrimitiveModel* observation = nullptr;
   const Surfels* surfels = nullptr;
   const Primitives* primitives = nullptr;
+  Image<std::uint8_t> claimed;                 ///< cells that an accepted instance explains; empty = none
 };
+
+/// Marks cells as explained and drops the features that lie in them.
+void claim_cells(SceneFeatures& scene, const std::vector<std::uint64_t>& bits);
 
 SceneFeatures make_scene_features(const Primitives& primitives, const PrimitiveModel& observation, const Surfels& surfels);
 
@@ -39,6 +43,9 @@ std::vector<PartFeature> visible_features(const Part& part, PrimitiveType type, 
 
 /// Too large to be a piece of the part: a table, a floor, a wall of the bin.
 bool is_background(const SceneFeature& feature, const Part& part);
+
+/// Flags the cells of the scan that belong to the background of a part or to an accepted instance.
+Image<std::uint8_t> background_cells(const SceneFeatures& scene, const Part& part);
 
 /// One cylinder: both senses of the axis, spins, slides. Leaves 2 of 6 directions to the enumeration.
 void hypotheses_from_cylinders(const SceneFeatures& scene, const Part& part, std::vector<Pose>& out);

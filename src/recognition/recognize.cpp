@@ -32,9 +32,10 @@ Instance make_instance(const Polished& p, std::span<const Part> parts, const Sce
   const Part& part = parts[static_cast<std::size_t>(p.candidate.part)];
   Instance out;
   out.part = part.name;
-  // The last word: every pixel (up to 60 000; more gain nothing against systematic terms).
-  const int step = step_for(part, scene, p.candidate.camera_from_part, 60000);
-  RefineOptions options = refine_options(part, step, 5, std::max(0.002 * part.diameter_mm, 4 * scene.median_sigma_mm));
+  // The last word: every pixel, up to 60 000 (more gain nothing against systematic terms), and every second one where the noise
+  // is so correlated that its neighbours repeat it (neighbour correlation over 0.6).
+  const int step = std::max(scene.correlation_px >= 0.7 ? 2 : 1, step_for(part, scene, p.candidate.camera_from_part, 60000));
+  RefineOptions options = refine_options(part, step, 3, std::max(0.002 * part.diameter_mm, 4 * scene.median_sigma_mm));
   options.outlines = true;
   options.frozen = free_directions_about_center(part, p.candidate.camera_from_part);
   const Refinement refined = refine_pose(part.render_mesh, scene, p.candidate.camera_from_part, options);
@@ -67,20 +68,9 @@ Instance make_instance(const Polished& p, std::span<const Part> parts, const Sce
   return out;
 }
 
-}  // namespace
-
-Instances recognize(const Primitives& primitives, const PrimitiveModel& observation, const Surfels& surfels,
-                    std::span<const Part> parts, const RecognitionOptions& options) {
-  TRIBIN_ASSERT(surfels.scan != nullptr);
-  Instances out;
-  const SceneDepth scene = make_scene_depth(*surfels.scan, surfels);
-  const SceneFeatures features = make_scene_features(primitives, observation, surfels);
-
-  std::vector<PoseCandidate> candidates;
-  for (std::size_t i = 0; i < parts.size(); ++i) {
-    std::vector<PoseCandidate> found = find_candidates(features, scene, parts[i], static_cast<int>(i), out.rejected);
-    candidates.insert(candidates.end(), found.begin(), found.end());
-  }
+/// Best first: each place of the scan goes to the pose, of any part, that explains it best.
+std::vector<Polished> choose(const SceneDepth& scene, std::span<const Part> parts, std::vector<PoseCandidate> candidates,
+                             std::vector<Reason>& rejected) {
   std::stable_sort(candidates.begin(), candidates.end(), [](const PoseCandidate& a, const PoseCandidate& b) {
     return a.verification.gain > b.verification.gain;
   });
@@ -89,8 +79,7 @@ Instances recognize(const Primitives& primitives, const PrimitiveModel& observat
     const auto k = static_cast<std::size_t>(i);
     masks[k] = mask_of(parts[static_cast<std::size_t>(candidates[k].part)], scene, candidates[k]);
   });
-
-  // Best first: each place of the scan goes to the pose, of any part, that explains it best.
+  std::vector<Polished> winners;
   std::vector<bool> done(candidates.size(), false);
   CellMask claimed;
   for (std::size_t i = 0; i < candidates.size(); ++i) {
@@ -98,15 +87,15 @@ Instances recognize(const Primitives& primitives, const PrimitiveModel& observat
     if (candidates[i].verification.gain <= 0) break;  // more speaks against it and all that follow than for them
     if (masks[i].count == 0 || overlap(claimed, masks[i]) > kOverlap) {
       done[i] = true;
-      add_reason(out.rejected, {parts[static_cast<std::size_t>(candidates[i].part)].name, "selection", "overlap",
-                                overlap(claimed, masks[i]), kOverlap});
+      add_reason(rejected, {parts[static_cast<std::size_t>(candidates[i].part)].name, "selection", "overlap",
+                            overlap(claimed, masks[i]), kOverlap});
       continue;
     }
     // The rivals for this place: the best two of each part that are not far behind.
     std::vector<std::size_t> rivals;
     std::vector<int> taken(parts.size(), 0);
     for (std::size_t k = i; k < candidates.size(); ++k) {
-      if (done[k] || candidates[k].verification.gain < 0.5 * candidates[i].verification.gain) continue;
+      if (done[k] || candidates[k].verification.gain < 0.7 * candidates[i].verification.gain) continue;
       int& n = taken[static_cast<std::size_t>(candidates[k].part)];
       if (n >= 2 || (k != i && overlap(masks[i], masks[k]) < 0.5)) continue;
       ++n;
@@ -114,23 +103,55 @@ Instances recognize(const Primitives& primitives, const PrimitiveModel& observat
     }
     std::vector<Polished> polished;
     for (const std::size_t k : rivals) polished.push_back(polish(scene, parts, candidates[k]));
-    std::vector<std::pair<const Part*, Pose>> poses;
-    for (const Polished& p : polished)
-      poses.emplace_back(&parts[static_cast<std::size_t>(p.candidate.part)], p.candidate.camera_from_part);
-    const int step = step_for(*poses[0].first, scene, poses[0].second, 6000);
-    const std::vector<double> likelihood = log_likelihoods(scene, poses, step);
     std::size_t best = 0;
-    for (std::size_t k = 1; k < polished.size(); ++k)
-      if (likelihood[k] > likelihood[best]) best = k;
+    std::vector<double> likelihood(polished.size(), 0.0);
+    if (polished.size() > 1) {
+      std::vector<std::pair<const Part*, Pose>> poses;
+      for (const Polished& p : polished)
+        poses.emplace_back(&parts[static_cast<std::size_t>(p.candidate.part)], p.candidate.camera_from_part);
+      likelihood = log_likelihoods(scene, poses, step_for(*poses[0].first, scene, poses[0].second, 6000));
+      best = static_cast<std::size_t>(std::max_element(likelihood.begin(), likelihood.end()) - likelihood.begin());
+    }
     for (const std::size_t k : rivals) done[k] = true;
-    const Polished& winner = polished[best];
-    const Part& part = *poses[best].first;
-    if (!acceptable(part, winner.candidate.verification, out.rejected)) continue;
+    Polished& winner = polished[best];
+    const Part& part = parts[static_cast<std::size_t>(winner.candidate.part)];
+    if (!acceptable(part, winner.candidate.verification, rejected)) continue;
     for (std::size_t k = 0; k < polished.size(); ++k)
       if (k != best)
-        add_reason(out.rejected, {poses[k].first->name, "selection", "log_likelihood", likelihood[k] - likelihood[best], 0});
+        add_reason(rejected, {parts[static_cast<std::size_t>(polished[k].candidate.part)].name, "selection", "log_likelihood",
+                              likelihood[k] - likelihood[best], 0});
     claimed.join(winner.mask);
-    out.items.push_back(make_instance(winner, parts, scene, features, surfels.scan->noise));
+    winners.push_back(std::move(winner));
+  }
+  return winners;
+}
+
+}  // namespace
+
+Instances recognize(const Primitives& primitives, const PrimitiveModel& observation, const Surfels& surfels,
+                    std::span<const Part> parts, const RecognitionOptions& options) {
+  TRIBIN_ASSERT(surfels.scan != nullptr);
+  Instances out;
+  SceneDepth scene = make_scene_depth(*surfels.scan, surfels);
+  SceneFeatures features = make_scene_features(primitives, observation, surfels);
+
+  // Rounds on what is left: primitives first, as long as they lead to parts; then regions; then the sweep.
+  for (const Source source : {Source::primitives, Source::regions, Source::sweep}) {
+    constexpr int kRounds = 8;  // each round takes at least one part of those that touch or hide each other
+    for (int round = 0; round < kRounds; ++round) {
+      std::vector<PoseCandidate> candidates;
+      for (std::size_t i = 0; i < parts.size(); ++i) {
+        const std::vector<PoseCandidate> found =
+            find_candidates(features, scene, parts[i], static_cast<int>(i), source, out.rejected);
+        candidates.insert(candidates.end(), found.begin(), found.end());
+      }
+      const std::vector<Polished> winners = choose(scene, parts, std::move(candidates), out.rejected);
+      for (const Polished& w : winners) {
+        out.items.push_back(make_instance(w, parts, scene, features, surfels.scan->noise));
+        claim_cells(features, w.mask.bits);
+      }
+      if (winners.empty()) break;
+    }
   }
   std::stable_sort(out.items.begin(), out.items.end(), [](const Instance& a, const Instance& b) { return a.score > b.score; });
   for (std::size_t i = 0; i < out.items.size(); ++i) out.items[i].id = static_cast<int>(i) + 1;

@@ -12,8 +12,14 @@ struct Region {
   Vec3 u, v;                    ///< across it
   Vec2 along_u, along_v;        ///< 1 % and 99 % quantiles of its cells [mm]
   double depth = 0;             ///< median along -toward
-  int cells = 0;
+  std::vector<std::int32_t> surfels;
 };
+
+double mean_view_area(const Part& part) {
+  double sum = 0;
+  for (const PartView& v : part.views) sum += v.area_mm2;
+  return sum / static_cast<double>(part.views.size());
+}
 
 Vec2 quantiles(std::vector<double>& x) {
   const auto cut = static_cast<std::ptrdiff_t>(x.size() / 100);
@@ -25,25 +31,37 @@ Vec2 quantiles(std::vector<double>& x) {
 
 /// Ids of the primitives that are too large for the part, as flags.
 std::vector<bool> background_flags(const SceneFeatures& scene, const Part& part) {
-  std::vector<bool> background(scene.features.size() + 1, false);
+  std::vector<bool> background(scene.primitives->items.size() + 1, false);
   for (const SceneFeature& f : scene.features)
     if (is_background(f, part)) background[static_cast<std::size_t>(f.primitive->id)] = true;
   return background;
 }
 
-/// Connected pieces of the cell grid that no background primitive explains.
+}  // namespace
+
+Image<std::uint8_t> background_cells(const SceneFeatures& scene, const Part& part) {
+  const std::vector<bool> background = background_flags(scene, part);
+  const Image<std::int32_t>& grid = scene.surfels->surfel_of_cell;
+  Image<std::uint8_t> out(grid.width, grid.height, 0);
+  for (std::size_t i = 0; i < grid.size(); ++i)
+    if (grid.data[i] >= 0)
+      out.data[i] = (!scene.claimed.empty() && scene.claimed.data[i]) || background[static_cast<std::size_t>(
+          scene.primitives->label_of_surfel[static_cast<std::size_t>(grid.data[i])])];
+  return out;
+}
+
+namespace {
+
+/// Connected pieces of the cell grid that neither the background nor an accepted instance explains.
 std::vector<Region> regions(const SceneFeatures& scene, const Part& part) {
   const Surfels& surfels = *scene.surfels;
-  const std::vector<bool> background = background_flags(scene, part);
+  const Image<std::uint8_t> background = background_cells(scene, part);
   const Image<std::int32_t>& grid = surfels.surfel_of_cell;
   Image<std::uint8_t> taken(grid.width, grid.height, 0);
   std::vector<Region> out;
   std::vector<std::pair<int, int>> stack;
   std::vector<std::int32_t> members;
-  const auto foreground = [&](int i, int j) {
-    const std::int32_t s = grid(i, j);
-    return s >= 0 && !background[static_cast<std::size_t>(scene.primitives->label_of_surfel[static_cast<std::size_t>(s)])];
-  };
+  const auto foreground = [&](int i, int j) { return grid(i, j) >= 0 && !background(i, j); };
   for (int j = 0; j < grid.height; ++j)
     for (int i = 0; i < grid.width; ++i) {
       if (taken(i, j) || !foreground(i, j)) continue;
@@ -63,9 +81,11 @@ std::vector<Region> regions(const SceneFeatures& scene, const Part& part) {
             stack.emplace_back(xx, yy);
           }
       }
-      if (members.size() < 20) continue;  // a crumb: less than any pose could be verified on
+      // A crumb: less than a seventh of what the part shows on average is the rim of something explained.
+      const double pitch = surfels.position[static_cast<std::size_t>(members[0])].z() / surfels.scan->camera.fx * surfels.cell_px;
+      if (members.size() < 20 || static_cast<double>(members.size()) * pitch * pitch < mean_view_area(part) / 7) continue;
       Region r;
-      r.cells = static_cast<int>(members.size());
+      r.surfels = members;
       Eigen::Vector3d sum = Eigen::Vector3d::Zero();
       for (const std::int32_t s : members) sum += surfels.position[static_cast<std::size_t>(s)].cast<double>();
       r.toward = Vec3(-sum.normalized());
@@ -122,16 +142,15 @@ void hypotheses_from_regions(const SceneFeatures& scene, const Part& part, std::
 void hypotheses_from_sweep(const SceneFeatures& scene, const Part& part, std::vector<Pose>& out) {
   constexpr int kSpins = 12;
   const Surfels& surfels = *scene.surfels;
-  const std::vector<bool> background = background_flags(scene, part);
   // Anchors a fifth of the diameter apart: the look-up settles a tenth.
   const double spacing = 0.2 * part.diameter_mm;
   std::vector<Vec3> anchors;
-  for (std::size_t s = 0; s < surfels.size(); ++s) {
-    if (background[static_cast<std::size_t>(scene.primitives->label_of_surfel[s])]) continue;
-    const Vec3 p = surfels.position[s].cast<double>();
-    if (std::none_of(anchors.begin(), anchors.end(), [&](const Vec3& a) { return (a - p).squaredNorm() < spacing * spacing; }))
-      anchors.push_back(p);
-  }
+  for (const Region& region : regions(scene, part))
+    for (const std::int32_t s : region.surfels) {
+      const Vec3 p = surfels.position[static_cast<std::size_t>(s)].cast<double>();
+      if (std::none_of(anchors.begin(), anchors.end(), [&](const Vec3& a) { return (a - p).squaredNorm() < spacing * spacing; }))
+        anchors.push_back(p);
+    }
   for (const Vec3& anchor : anchors) {
     const Vec3 toward = Vec3(-Eigen::Vector3d(anchor).normalized());
     Vec3 su, sv;

@@ -11,6 +11,7 @@ namespace tribin {
 struct LookUp {
   int supported = 0;  ///< the scan is where the point is, and its normal agrees
   int unsure = 0;     ///< the scan is where the point is, but has no normal there: an edge or a hole nearby
+  int background = 0; ///< the scan is where the point is, but belongs to the background: neither for nor against
   int violated = 0;   ///< the scan lies behind: the camera sees through the part
   int occluded = 0;   ///< the scan lies in front: nothing is known
   int no_data = 0;    ///< no measurement there, or outside of the image

@@ -12,6 +12,9 @@ struct SceneDepth {
   Image<float> z_mm;              ///< NaN = no measurement
   Image<std::uint8_t> near_break; ///< 1 where a depth break or the border of a hole lies within one pixel: mixed pixels
   Image<Vec3f> cell_normal;       ///< towards the camera; zero where the cell has no surfel
+  /// 1 where a cell belongs to a surface that is too large for the part looked for (a table, a wall): a face of the part that
+  /// lies in it is seen nowhere. Empty = none.
+  Image<std::uint8_t> background;
   int cell_px = 1;
   const Surfels* surfels = nullptr;
   double correlation_px = 0;
@@ -27,6 +30,10 @@ struct SceneDepth {
   Vec3f normal(int u, int v) const {
     const int i = u / cell_px, j = v / cell_px;
     return cell_normal.contains(i, j) ? cell_normal(i, j) : Vec3f(Vec3f::Zero());
+  }
+  bool is_background(int u, int v) const {
+    const int i = u / cell_px, j = v / cell_px;
+    return background.contains(i, j) && background(i, j);
   }
 };
 
