@@ -135,15 +135,16 @@ RefineOptions refine_options(const Part& part, int step_px, int iterations, doub
 namespace {
 
 /// Hypotheses -> look-up -> settled -> rendered, each time fewer.
+/// \param most  that are settled; a seventh of them is rendered.
 std::vector<PoseCandidate> sift(const SceneDepth& scene, const Part& part, int part_index, const std::vector<Pose>& poses,
-                            std::size_t settle_from, std::vector<Reason>& rejected) {
+                            std::size_t settle_from, std::size_t most, std::vector<Reason>& rejected) {
   std::vector<Scored> coarse = look_up_all(scene, part, poses, settle_from);
   if (poses.size() > coarse.size())
     add_reason(rejected, {part.name, "hypothesis", "look_up", coarse.empty() ? 0.0 : 0.3, 0.3,
                           static_cast<int>(poses.size() - coarse.size())});
-  coarse = best_apart(part, std::move(coarse), 160, 0.05 * part.diameter_mm, 14 * kDegree);
+  coarse = best_apart(part, std::move(coarse), most, 0.05 * part.diameter_mm, 14 * kDegree);
   std::vector<Scored> settled = settle(scene, part, std::move(coarse));
-  settled = best_apart(part, std::move(settled), 24, 0.02 * part.diameter_mm, 6 * kDegree);
+  settled = best_apart(part, std::move(settled), most / 7, 0.02 * part.diameter_mm, 6 * kDegree);
   // Far behind the best of the whole scan is not worth a rendering.
   std::erase_if(settled, [best = settled.empty() ? 0 : settled[0].score](const Scored& x) { return x.score < 0.5 * best; });
 
@@ -182,13 +183,14 @@ std::vector<PoseCandidate> find_candidates(const SceneFeatures& features, SceneD
     hypotheses_from_pairs(features, part, poses);
     hypotheses_from_cylinders(features, part, poses);
     hypotheses_from_planes(features, part, poses);
-    return sift(scene, part, part_index, poses, poses.size(), rejected);
+    return sift(scene, part, part_index, poses, poses.size(), 160, rejected);
   }
   if (source == Source::regions)
     hypotheses_from_regions(features, part, poses);
   else
     hypotheses_from_sweep(features, part, poses);
-  return sift(scene, part, part_index, poses, 0, rejected);
+  // Without a primitive's word for it the right pose stands further down the list.
+  return sift(scene, part, part_index, poses, 0, 600, rejected);
 }
 
 }  // namespace tribin

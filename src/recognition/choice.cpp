@@ -30,15 +30,12 @@ Pose turned(const Pose& pose, const ContinuousSymmetry& line, double angle) {
 /// score, because ICP slides past the small features that decide.
 void add_spins(const SceneDepth& scene, const Part& part, const Pose& pose, std::vector<Pose>& out) {
   constexpr int kSpins = 120;          // 3 deg: a hole of 5 % of the diameter at its rim
-  constexpr std::size_t kBest = 6;
-  const VerificationOptions options =
-      verification_options(part, step_for(part, scene, pose, kPolishPixels), 0.002 * part.diameter_mm);
+  constexpr std::size_t kBest = 8;
+  const int step = step_for(part, scene, pose, kPolishPixels);
   for (const ContinuousSymmetry& axis : part.nearly_round) {
-    std::vector<double> score(kSpins);
-    parallel_each(kSpins, [&](int k) {
-      score[static_cast<std::size_t>(k)] =
-          verify_pose(part.render_mesh, scene, turned(pose, axis, 2 * kPi * k / kSpins), options).gain;
-    });
+    std::vector<std::pair<const Part*, Pose>> spins;
+    for (int k = 0; k < kSpins; ++k) spins.emplace_back(&part, turned(pose, axis, 2 * kPi * k / kSpins));
+    const std::vector<double> score = log_likelihoods(scene, spins, step);
     std::vector<int> maxima;
     for (int k = 1; k < kSpins; ++k) {
       const auto at = [&](int i) { return score[static_cast<std::size_t>((i + kSpins) % kSpins)]; };
@@ -181,9 +178,13 @@ Polished polish(const SceneDepth& scene, std::span<const Part> parts, const Pose
   const double noise = 4 * scene.median_sigma_mm;
   const int few = step_for(part, scene, candidate.camera_from_part, kCompareFew);
 
+  // The spin search compares poses that differ in small features only: it needs a place that is right to the noise.
+  std::vector<Finalist> first = {{candidate.camera_from_part, 0}};
+  compare(scene, part, step_for(part, scene, candidate.camera_from_part, kPolishPixels), first);
+
   // Coarse: every rival is settled on few pixels; only those near the best are worth more.
-  std::vector<Pose> poses = rivals(scene, part, candidate.camera_from_part);
-  poses.insert(poses.begin(), candidate.camera_from_part);
+  std::vector<Pose> poses = rivals(scene, part, first[0].pose);
+  poses.insert(poses.begin(), first[0].pose);
   std::vector<Verification> checks(poses.size());
   parallel_each(static_cast<int>(poses.size()), [&](int i) {
     const auto k = static_cast<std::size_t>(i);
@@ -199,13 +200,13 @@ Polished polish(const SceneDepth& scene, std::span<const Part> parts, const Pose
   for (std::size_t k = 0; k < poses.size(); ++k)
     if (k == 0 || checks[k].gain > 0.85 * best) keep.push_back(k);
   std::stable_sort(keep.begin(), keep.end(), [&](std::size_t a, std::size_t b) { return checks[a].gain > checks[b].gain; });
-  if (keep.size() > 12) keep.resize(12);
+  if (keep.size() > 14) keep.resize(14);
 
   // Fine: the survivors on more pixels, compared by likelihood; those that stay near the best once more on all pixels.
   std::vector<Finalist> finalists;
   for (const std::size_t k : keep) finalists.push_back({poses[k], 0});
   const int fine = step_for(part, scene, candidate.camera_from_part, kPolishPixels);
-  compare(scene, part, fine, finalists);
+  if (finalists.size() > 1) compare(scene, part, fine, finalists);
   std::erase_if(finalists, [best = finalists[0].log_likelihood](const Finalist& f) { return f.log_likelihood < best - kUndecided; });
   if (finalists.size() > 1) compare(scene, part, step_for(part, scene, candidate.camera_from_part, kDecidePixels), finalists);
 

@@ -39,13 +39,26 @@ std::vector<bool> background_flags(const SceneFeatures& scene, const Part& part)
 
 }  // namespace
 
+namespace {
+
+/// Local sd of z at a cell [mm].
+double local_sigma(const Surfels& surfels, std::size_t cell) {
+  const Image<float>& tiles = surfels.local_sigma_mm;
+  const int i = static_cast<int>(cell) % surfels.surfel_of_cell.width, j = static_cast<int>(cell) / surfels.surfel_of_cell.width;
+  return tiles(std::min(i / 8, tiles.width - 1), std::min(j / 8, tiles.height - 1));
+}
+
+}  // namespace
+
 Image<std::uint8_t> background_cells(const SceneFeatures& scene, const Part& part) {
   const std::vector<bool> background = background_flags(scene, part);
   const Image<std::int32_t>& grid = scene.surfels->surfel_of_cell;
   Image<std::uint8_t> out(grid.width, grid.height, 0);
+  // Noise that hides 6 % of the part's size (4 sigma) lets everything look like it: such places say nothing of this part.
+  const double loudest = 0.015 * part.diameter_mm;
   for (std::size_t i = 0; i < grid.size(); ++i)
     if (grid.data[i] >= 0)
-      out.data[i] = (!scene.claimed.empty() && scene.claimed.data[i]) || background[static_cast<std::size_t>(
+      out.data[i] = local_sigma(*scene.surfels, i) > loudest || (!scene.claimed.empty() && scene.claimed.data[i]) || background[static_cast<std::size_t>(
           scene.primitives->label_of_surfel[static_cast<std::size_t>(grid.data[i])])];
   return out;
 }
