@@ -15,6 +15,9 @@ namespace {
 // only cells along their common edge.
 constexpr double kOverlap = 0.3;
 
+// A place and class less likely than this is kept back: a robot that trusts it would miss twice in five picks.
+constexpr double kSureEnough = 0.6;
+
 double overlap(const CellMask& a, const CellMask& b) {
   const int smaller = std::min(a.count, b.count);
   return smaller > 0 ? double(a.shared(b)) / smaller : 0;
@@ -25,6 +28,24 @@ double overlap(const CellMask& a, const CellMask& b) {
 double probability(const Verification& v) {
   const double x = 8 * (v.fit() - 0.45) + 4 * (v.contour() - 0.5) - 10 * v.free_space();
   return 1 / (1 + std::exp(-x));
+}
+
+/// Probability that the error of a point at the part's rim stays below 5 % of the diameter, given the covariance: the part of
+/// "found" that the noise can spoil. Maxwell's distribution of a 3-D error with equal axes.
+double precision_probability(const Part& part, const Instance& instance) {
+  const double half = 0.5 * part.diameter_mm;
+  const Eigen::Matrix<double, 6, 6> c = instance.covariance;
+  // About the box centre, not the CAD's origin, which may lie far off.
+  const Eigen::Vector3d arm = instance.camera_from_part.linear() * Eigen::Vector3d(part.box_center());
+  Eigen::Matrix<double, 3, 6> j = Eigen::Matrix<double, 3, 6>::Zero();
+  j.leftCols<3>().setIdentity();
+  j.rightCols<3>() << 0, arm.z(), -arm.y(), -arm.z(), 0, arm.x(), arm.y(), -arm.x(), 0;
+  const double place = (j * c * j.transpose()).trace();
+  const double turn = c.bottomRightCorner<3, 3>().trace() * half * half;
+  const double s = std::sqrt((place + turn) / 3);
+  if (!(s > 0)) return 1;
+  const double x = 0.05 * part.diameter_mm / s;
+  return std::erf(x / std::sqrt(2.0)) - std::sqrt(2 / kPi) * x * std::exp(-0.5 * x * x);
 }
 
 Instance make_instance(const Polished& p, std::span<const Part> parts, const SceneDepth& scene, const SceneFeatures& features,
@@ -64,7 +85,7 @@ Instance make_instance(const Polished& p, std::span<const Part> parts, const Sce
   out.visible_fraction = v.visible_fraction();
   double main = 1;
   for (const Alternative& a : out.alternatives) main -= a.probability;
-  out.score = probability(v) * main;
+  out.score = probability(v) * precision_probability(part, out) * main;
   return out;
 }
 
@@ -147,8 +168,15 @@ Instances recognize(const Primitives& primitives, const PrimitiveModel& observat
       }
       const std::vector<Polished> winners = choose(scene, parts, std::move(candidates), out.rejected);
       for (const Polished& w : winners) {
-        out.items.push_back(make_instance(w, parts, scene, features, surfels.scan->noise));
+        Instance instance = make_instance(w, parts, scene, features, surfels.scan->noise);
         claim_cells(features, w.mask.bits);
+        double main = 1;
+        for (const Alternative& a : instance.alternatives) main -= a.probability;
+        // Which of its self-similar poses it is in may be open; that it is there may not.
+        if (const double sure = instance.score / main; sure < kSureEnough)
+          add_reason(out.rejected, {instance.part, "acceptance", "probability", sure, kSureEnough});
+        else
+          out.items.push_back(std::move(instance));
       }
       if (winners.empty()) break;
     }
