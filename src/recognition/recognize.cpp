@@ -116,7 +116,7 @@ std::vector<Polished> choose(const SceneDepth& scene, std::span<const Part> part
     std::vector<std::size_t> rivals;
     std::vector<int> taken(parts.size(), 0);
     for (std::size_t k = i; k < candidates.size(); ++k) {
-      if (done[k] || candidates[k].verification.gain < 0.7 * candidates[i].verification.gain) continue;
+      if (done[k] || candidates[k].verification.gain < 0.8 * candidates[i].verification.gain) continue;
       int& n = taken[static_cast<std::size_t>(candidates[k].part)];
       if (n >= 2 || (k != i && overlap(masks[i], masks[k]) < 0.5)) continue;
       ++n;
