@@ -83,7 +83,10 @@ Found find_parts(const Scan& scan, std::span<const Part> parts, const FinderOpti
     recognition.time_limit_ms = options.time_limit_ms;
     found.instances = recognize(found.primitives, found.observation, found.surfels, parts, recognition);
   }
-  found.status = found.instances.items.empty() ? "not_empty_no_object" : "ok";
+  if (!found.instances.items.empty())
+    found.status = "ok";
+  else
+    found.status = found.instances.unexplained ? "not_empty_no_object" : "empty";
   return found;
 }
 

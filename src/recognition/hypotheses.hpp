@@ -57,6 +57,9 @@ void hypotheses_from_pairs(const SceneFeatures& scene, const Part& part, std::ve
 /// \source the paper's "distance based classifier in 2-D image space" (III-B), on what the other spaces leave.
 void hypotheses_from_regions(const SceneFeatures& scene, const Part& part, std::vector<Pose>& out);
 
+/// Is a region left that could be a piece of the part?
+bool anything_left(const SceneFeatures& scene, const Part& part);
+
 /// The same where regions are larger than the part (heaps, touching parts, noise): every view in every spin at places spread over
 /// all that no background explains. Tens of thousands of poses; the last resort.
 void hypotheses_from_sweep(const SceneFeatures& scene, const Part& part, std::vector<Pose>& out);

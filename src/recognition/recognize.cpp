@@ -183,7 +183,7 @@ Instances recognize(const Primitives& primitives, const PrimitiveModel& observat
   }
   std::stable_sort(out.items.begin(), out.items.end(), [](const Instance& a, const Instance& b) { return a.score > b.score; });
   for (std::size_t i = 0; i < out.items.size(); ++i) out.items[i].id = static_cast<int>(i) + 1;
-  (void)options;
+  out.unexplained = std::any_of(parts.begin(), parts.end(), [&](const Part& p) { return anything_left(features, p); });
   return out;
 }
 

@@ -152,6 +152,8 @@ void hypotheses_from_regions(const SceneFeatures& scene, const Part& part, std::
   }
 }
 
+bool anything_left(const SceneFeatures& scene, const Part& part) { return !regions(scene, part).empty(); }
+
 void hypotheses_from_sweep(const SceneFeatures& scene, const Part& part, std::vector<Pose>& out) {
   constexpr int kSpins = 12;
   const Surfels& surfels = *scene.surfels;

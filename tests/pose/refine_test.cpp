@@ -1,0 +1,133 @@
+#include "tribin/pose/refine.hpp"
+
+#include <gtest/gtest.h>
+
+#include "support/posed_scan.hpp"
+#include "support/solids.hpp"
+#include "tribin/core/parallel.hpp"
+#include "tribin/pose/verification.hpp"
+
+namespace tribin {
+namespace {
+
+/// A block with a step and a post: three pairs of faces and no symmetry.
+Mesh stepped_block() {
+  Mesh mesh;
+  test::add_box(mesh, Vec3f(-40, -25, -15), Vec3f(40, 25, 15));
+  test::add_box(mesh, Vec3f(-40, -25, 15), Vec3f(5, 10, 30));
+  test::add_box(mesh, Vec3f(15, -20, 15), Vec3f(27, -8, 22));
+  return mesh;
+}
+
+RefineOptions options_for_block() {
+  RefineOptions options;
+  options.start_scale_mm = 2;
+  options.lever_mm = 35;
+  return options;
+}
+
+TEST(RenderIndex, SeesTheDepthOfAPlaneFace) {
+  Mesh mesh;
+  test::add_box(mesh, Vec3f(-10, -10, -10), Vec3f(10, 10, 10));
+  Pose pose = Pose::Identity();
+  pose.translation() = Eigen::Vector3d(0, 0, 510);
+  const PinholeCamera camera{200, 160, 500, 500, 99.5, 79.5};
+  IndexRender render;
+  render_index(make_render_mesh(mesh), camera, pose, 1, render);
+  EXPECT_EQ(render.silhouette_pixels, 400u);  // 20 mm at 500 mm and 500 px: 20 x 20 pixels
+  for (std::size_t i = 0; i < render.triangle.size(); ++i)
+    if (render.triangle[i] >= 0) EXPECT_NEAR(1 / render.inverse_z[i], 500, 1e-3);
+}
+
+TEST(RefinePose, MeetsTheTruthWithinTheNoise) {
+  const Mesh mesh = stepped_block();
+  const RenderMesh render_mesh = make_render_mesh(mesh);
+  for (unsigned seed = 1; seed <= 12; ++seed) {
+    SCOPED_TRACE(seed);
+    const Pose truth = test::random_pose(600, seed);
+    const Scan scan = test::posed_scan({{&mesh, truth}}, Vec3(0, 0, -1), -720, 0.1, 0.6, seed);
+    const Surfels surfels = surfels_from_scan(scan);
+    const SceneDepth scene = make_scene_depth(scan, surfels);
+    Vector6 off;
+    off << 0.5, -0.4, 0.6, 0.008, -0.006, 0.007;
+    RefineOptions options = options_for_block();
+    options.outlines = true;  // from some sides one face is all that is seen
+    const Refinement refined = refine_pose(render_mesh, scene, moved(truth, off), options);
+    const Eigen::Vector3d error = refined.camera_from_part.translation() - truth.translation();
+    const double turn = rotation_angle(refined.camera_from_part.linear(), truth.linear());
+    // Five standard deviations of its own information, and the outline's raster along the directions that one face leaves open.
+    const Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>(refined.information).inverse();
+    EXPECT_LT(error.norm(), 5 * std::sqrt(covariance.topLeftCorner<3, 3>().trace()) + 0.02);
+    EXPECT_LT(turn, 5 * std::sqrt(covariance.bottomRightCorner<3, 3>().trace()) + 0.02 * kDegree);
+  }
+}
+
+TEST(RefinePose, LeavesAFrozenDirectionAlone) {
+  const Mesh mesh = stepped_block();
+  const Pose truth = test::random_pose(600, 3);
+  const Scan scan = test::posed_scan({{&mesh, truth}}, Vec3(0, 0, -1), -720, 0.05, 0, 3);
+  const Surfels surfels = surfels_from_scan(scan);
+  const SceneDepth scene = make_scene_depth(scan, surfels);
+  Pose start = truth;
+  start.translation().z() += 0.7;
+  RefineOptions options = options_for_block();
+  Vector6 along_z = Vector6::Zero();
+  along_z[2] = 1;
+  options.frozen = {along_z};
+  const Refinement refined = refine_pose(make_render_mesh(mesh), scene, start, options);
+  // Rotations turn about the box centre, which is the origin here: nothing else may move it along z.
+  EXPECT_NEAR(refined.camera_from_part.translation().z(), start.translation().z(), 1e-9);
+}
+
+TEST(RefinePose, GivesTheSameBytesOnAnyNumberOfThreads) {
+  const Mesh mesh = stepped_block();
+  const Pose truth = test::random_pose(600, 5);
+  const Scan scan = test::posed_scan({{&mesh, truth}}, Vec3(0, 0, -1), -720, 0.1, 1, 5);
+  const Surfels surfels = surfels_from_scan(scan);
+  const SceneDepth scene = make_scene_depth(scan, surfels);
+  RefineOptions options = options_for_block();
+  options.outlines = true;
+  set_thread_count(1);
+  const Refinement one = refine_pose(make_render_mesh(mesh), scene, truth, options);
+  set_thread_count(2);
+  const Refinement two = refine_pose(make_render_mesh(mesh), scene, truth, options);
+  set_thread_count(0);
+  EXPECT_TRUE(one.camera_from_part.matrix() == two.camera_from_part.matrix());
+  EXPECT_TRUE(one.information == two.information);
+}
+
+TEST(VerifyPose, TellsTheRightPoseFromOneThatHangsInTheAir) {
+  const Mesh mesh = stepped_block();
+  const Pose truth = test::random_pose(600, 7);
+  const Scan scan = test::posed_scan({{&mesh, truth}}, Vec3(0, 0, -1), -720, 0.1, 0.6, 7);
+  const Surfels surfels = surfels_from_scan(scan);
+  const SceneDepth scene = make_scene_depth(scan, surfels);
+  VerificationOptions options;
+  options.diameter_mm = 100;
+  const Verification right = verify_pose(make_render_mesh(mesh), scene, truth, options);
+  EXPECT_GT(right.support(), 0.97);
+  EXPECT_GT(right.contour(), 0.9);
+  EXPECT_LT(right.free_space(), 0.01);
+  Pose nearer = truth;
+  nearer.translation().z() -= 40;
+  EXPECT_GT(verify_pose(make_render_mesh(mesh), scene, nearer, options).free_space(), 0.8);
+}
+
+TEST(VerifyPose, AFaceInTheFloorHasNoOutline) {
+  // A plate pushed into the floor: the floor supports every pixel of it, and goes on beyond its outline.
+  Mesh plate;
+  test::add_box(plate, Vec3f(-40, -30, 0), Vec3f(40, 30, 10));
+  const Scan scan = test::posed_scan({}, Vec3(0, 0, -1), -600, 0.1, 0.6, 9);
+  const Surfels surfels = surfels_from_scan(scan);
+  const SceneDepth scene = make_scene_depth(scan, surfels);
+  Pose pose = Pose::Identity();
+  pose.translation() = Eigen::Vector3d(0, 0, 600);
+  VerificationOptions options;
+  options.diameter_mm = 100;
+  const Verification v = verify_pose(make_render_mesh(plate), scene, pose, options);
+  EXPECT_GT(v.support(), 0.97);
+  EXPECT_LT(v.contour(), 0.05);
+}
+
+}  // namespace
+}  // namespace tribin
