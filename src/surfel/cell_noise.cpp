@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "tribin/core/parallel.hpp"
@@ -100,10 +101,10 @@ ThirdDifferences noise_from_third_differences(const Scan& scan, const Image<floa
   const Image<float>& z = scan.z_mm;
   const std::size_t total = 2 * z.size();
   const int stride = std::max<int>(1, static_cast<int>(total / kWanted / 2));
-  std::vector<float> near_abs, far_abs, quantum;
-  near_abs.reserve(2 * kWanted + 1024);
-  far_abs.reserve(2 * kWanted + 1024);
-  for (int axis = 0; axis < 2; ++axis) {
+  std::vector<float> near_of[2], far_of[2], quantum_of[2];  // along rows, along columns
+  parallel_each(2, [&](int axis) {
+    std::vector<float>&near_abs = near_of[axis], &far_abs = far_of[axis], &quantum = quantum_of[axis];
+    for (auto* v : {&near_abs, &far_abs, &quantum}) v->reserve(kWanted + 1024);
     const int du = axis == 0 ? 1 : 0, dv = 1 - du;
     for (int v = 0; v + kSpan * dv < z.height; ++v)
       // A phase for each row, so that samples do not line up in columns.
@@ -126,7 +127,12 @@ ThirdDifferences noise_from_third_differences(const Scan& scan, const Image<floa
         far_abs.push_back(static_cast<float>(std::abs(w(0) - 3 * w(kFar) + 3 * w(2 * kFar) - w(3 * kFar)) * scale));
         quantum.push_back(step);
       }
-  }
+  });
+  const auto joined = [](std::vector<float>(&of)[2]) {
+    of[0].insert(of[0].end(), of[1].begin(), of[1].end());
+    return std::move(of[0]);
+  };
+  std::vector<float> near_abs = joined(near_of), far_abs = joined(far_of), quantum = joined(quantum_of);
   ThirdDifferences result;
   if (far_abs.empty()) return result;
   const double dither_variance = 20.0 * std::pow(median(quantum), 2) / 12.0;
