@@ -80,10 +80,14 @@ Found find_parts(const Scan& scan, std::span<const Part> parts, const FinderOpti
     RecognitionOptions recognition;
     recognition.tolerance_mm = options.tolerance_mm;
     recognition.tolerance_rad = options.tolerance_rad;
-    recognition.time_limit_ms = options.time_limit_ms;
+    // What the stages before took counts too.
+    if (options.time_limit_ms > 0)
+      recognition.time_limit_ms = std::max(1, options.time_limit_ms - static_cast<int>(found.times.total()));
     found.instances = recognize(found.primitives, found.observation, found.surfels, parts, recognition);
   }
-  if (!found.instances.items.empty())
+  if (found.instances.time_limit)
+    found.status = "time_limit";
+  else if (!found.instances.items.empty())
     found.status = "ok";
   else
     found.status = found.instances.unexplained ? "not_empty_no_object" : "empty";

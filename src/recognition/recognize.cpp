@@ -1,6 +1,7 @@
 #include "tribin/recognition/recognize.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 
 #include "choice.hpp"
@@ -30,26 +31,25 @@ double probability(const Verification& v) {
   return 1 / (1 + std::exp(-x));
 }
 
-/// Probability that the error of a point at the part's rim stays below 5 % of the diameter, given the covariance: the part of
-/// "found" that the noise can spoil. Maxwell's distribution of a 3-D error with equal axes.
-double precision_probability(const Part& part, const Instance& instance) {
-  const double half = 0.5 * part.diameter_mm;
+/// Probability that a 3-D error of rms length `rms` stays below a limit: Maxwell's distribution, its axes taken as equal.
+double probability_below(double limit, double rms) {
+  if (!(rms > 0)) return 1;
+  const double x = limit * std::sqrt(3.0) / rms;
+  return std::erf(x / std::sqrt(2.0)) - std::sqrt(2 / kPi) * x * std::exp(-0.5 * x * x);
+}
+
+/// Root mean squares of the errors that the covariance predicts: of the box centre's place [mm], and of the rotation [rad].
+std::pair<double, double> predicted_errors(const Part& part, const Instance& instance) {
   const Eigen::Matrix<double, 6, 6> c = instance.covariance;
-  // About the box centre, not the CAD's origin, which may lie far off.
   const Eigen::Vector3d arm = instance.camera_from_part.linear() * Eigen::Vector3d(part.box_center());
   Eigen::Matrix<double, 3, 6> j = Eigen::Matrix<double, 3, 6>::Zero();
   j.leftCols<3>().setIdentity();
   j.rightCols<3>() << 0, arm.z(), -arm.y(), -arm.z(), 0, arm.x(), arm.y(), -arm.x(), 0;
-  const double place = (j * c * j.transpose()).trace();
-  const double turn = c.bottomRightCorner<3, 3>().trace() * half * half;
-  const double s = std::sqrt((place + turn) / 3);
-  if (!(s > 0)) return 1;
-  const double x = 0.05 * part.diameter_mm / s;
-  return std::erf(x / std::sqrt(2.0)) - std::sqrt(2 / kPi) * x * std::exp(-0.5 * x * x);
+  return {std::sqrt((j * c * j.transpose()).trace()), std::sqrt(c.bottomRightCorner<3, 3>().trace())};
 }
 
 Instance make_instance(const Polished& p, std::span<const Part> parts, const SceneDepth& scene, const SceneFeatures& features,
-                       const NoiseProfile& noise) {
+                       const NoiseProfile& noise, const RecognitionOptions& recognition) {
   const Part& part = parts[static_cast<std::size_t>(p.candidate.part)];
   Instance out;
   out.part = part.name;
@@ -85,7 +85,15 @@ Instance make_instance(const Polished& p, std::span<const Part> parts, const Sce
   out.visible_fraction = v.visible_fraction();
   double main = 1;
   for (const Alternative& a : out.alternatives) main -= a.probability;
-  out.score = probability(v) * precision_probability(part, out) * main;
+  const auto [place, turn] = predicted_errors(part, out);
+  // "Found" is 5 % of the diameter at the rim, half a diameter from the centre.
+  out.score = probability(v) * probability_below(0.05 * part.diameter_mm, std::hypot(place, turn * 0.5 * part.diameter_mm)) * main;
+  if (recognition.tolerance_mm > 0 || recognition.tolerance_rad > 0) {
+    double within = out.score;
+    if (recognition.tolerance_mm > 0) within *= probability_below(recognition.tolerance_mm, place);
+    if (recognition.tolerance_rad > 0) within *= probability_below(recognition.tolerance_rad, turn);
+    out.p_within_tolerance = within;
+  }
   return out;
 }
 
@@ -156,10 +164,15 @@ Instances recognize(const Primitives& primitives, const PrimitiveModel& observat
   SceneDepth scene = make_scene_depth(*surfels.scan, surfels);
   SceneFeatures features = make_scene_features(primitives, observation, surfels);
 
+  const auto start = std::chrono::steady_clock::now();
+  const auto late = [&] {
+    return options.time_limit_ms > 0 && std::chrono::steady_clock::now() - start > std::chrono::milliseconds(options.time_limit_ms);
+  };
   // Rounds on what is left: primitives first, as long as they lead to parts; then regions; then the sweep.
   for (const Source source : {Source::primitives, Source::regions, Source::sweep}) {
     constexpr int kRounds = 8;  // each round takes at least one part of those that touch or hide each other
     for (int round = 0; round < kRounds; ++round) {
+      if ((out.time_limit = late())) break;
       std::vector<PoseCandidate> candidates;
       for (std::size_t i = 0; i < parts.size(); ++i) {
         const std::vector<PoseCandidate> found =
@@ -168,7 +181,7 @@ Instances recognize(const Primitives& primitives, const PrimitiveModel& observat
       }
       const std::vector<Polished> winners = choose(scene, parts, std::move(candidates), out.rejected);
       for (const Polished& w : winners) {
-        Instance instance = make_instance(w, parts, scene, features, surfels.scan->noise);
+        Instance instance = make_instance(w, parts, scene, features, surfels.scan->noise, options);
         claim_cells(features, w.mask.bits);
         double main = 1;
         for (const Alternative& a : instance.alternatives) main -= a.probability;

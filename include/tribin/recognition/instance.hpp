@@ -56,6 +56,7 @@ struct Instance {
 struct Instances {
   std::vector<Instance> items;
   std::vector<Reason> rejected;
+  bool time_limit = false;   ///< the time ran out before all that is left was looked at
   bool unexplained = false;  ///< something of a part's size is left that neither a part nor a large surface explains
 };
 

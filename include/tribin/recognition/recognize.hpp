@@ -9,9 +9,9 @@
 namespace tribin {
 
 struct RecognitionOptions {
-  double tolerance_mm = 0;   ///< asked-for accuracy of the place; 0 = none. Refuses what is not sure enough
-  double tolerance_rad = 0;  ///< and of the rotation
-  int time_limit_ms = 0;     ///< 0 = none
+  double tolerance_mm = 0;   ///< > 0: p_within_tolerance tells how likely the place is that good
+  double tolerance_rad = 0;  ///< and the rotation
+  int time_limit_ms = 0;     ///< > 0: no new round of the search is begun after it; 0 = none
 };
 
 /// Finds the parts in a scan: hypotheses from primitives, looked up in the depth image, verified by rendering, chosen
