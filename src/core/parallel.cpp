@@ -42,8 +42,8 @@ void parallel_each(int count, const std::function<void(int)>& body) {
     for (int i = 0; i < count; ++i) body(i);
     return;
   }
-  // Isolated: a thread that waits for this loop must not start another task of an outer loop in between, which would share
-  // its thread-local buffers.
+  // Isolated: a thread that waits for this loop must not start another task of an outer loop in between, which would
+  // share its thread-local buffers.
   tbb::this_task_arena::isolate([&] {
     tbb::parallel_for(
         tbb::blocked_range<int>(0, count, 1),

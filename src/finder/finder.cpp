@@ -16,7 +16,8 @@ std::vector<double> radii_of(std::span<const Part> parts) {
     for (const Primitive& p : part.model.primitives)
       if (p.type == PrimitiveType::cylinder || p.type == PrimitiveType::sphere) radii.push_back(p.radius_mm);
   std::sort(radii.begin(), radii.end());
-  radii.erase(std::unique(radii.begin(), radii.end(), [](double a, double b) { return b - a < 1e-3 * b; }), radii.end());
+  radii.erase(std::unique(radii.begin(), radii.end(), [](double a, double b) { return b - a < 1e-3 * b; }),
+              radii.end());
   return radii;
 }
 
@@ -35,15 +36,17 @@ void check_size(const Scan& scan, const Part& part, std::vector<Warning>& warnin
   const double ratio = part.diameter_mm / extent;
   if (ratio >= 0.01 && ratio <= 20) {
     if (ratio < 0.02 || ratio > 2)
-      warnings.push_back({"part_size", part.name + " is " + std::to_string(part.diameter_mm) + " mm across in a scan of " +
-                                           std::to_string(extent) + " mm: is the CAD's unit right?"});
+      warnings.push_back({"part_size", part.name + " is " + std::to_string(part.diameter_mm) +
+                                           " mm across in a scan of " + std::to_string(extent) +
+                                           " mm: is the CAD's unit right?"});
     return;
   }
   const char* unit = ratio < 0.01 ? (ratio * 1000 < 20 && ratio * 1000 > 0.01 ? "m" : "inch") : "mm";
-  throw Error(ErrorCode::out_of_range, part.name + ": the part is " + std::to_string(part.diameter_mm) +
-                                           " mm across, the scan " + std::to_string(extent) +
-                                           " mm; a part of 1 % to 20 times the scan is wanted. Is the CAD in another unit? Try --unit " +
-                                           unit + ".");
+  throw Error(ErrorCode::out_of_range,
+              part.name + ": the part is " + std::to_string(part.diameter_mm) + " mm across, the scan " +
+                  std::to_string(extent) +
+                  " mm; a part of 1 % to 20 times the scan is wanted. Is the CAD in another unit? Try --unit " + unit +
+                  ".");
 }
 
 }  // namespace
@@ -59,7 +62,8 @@ Found find_parts(const Scan& scan, std::span<const Part> parts, const FinderOpti
   SegmentationOptions segmentation = options.segmentation;
   if (segmentation.radii_mm.empty()) segmentation.radii_mm = radii_of(parts);
   if (!segmentation.radii_mm.empty())
-    surfel.max_radius_mm = static_cast<float>(*std::max_element(segmentation.radii_mm.begin(), segmentation.radii_mm.end()));
+    surfel.max_radius_mm =
+        static_cast<float>(*std::max_element(segmentation.radii_mm.begin(), segmentation.radii_mm.end()));
 
   segmentation.boundaries = false;  // nothing below reads them
 

@@ -46,7 +46,8 @@ std::vector<ContinuousSymmetry> nearly_round_axes(const Part& part) {
     if (s.overlap < kOverlap) continue;
     const Eigen::AngleAxisd turn{Eigen::Matrix3d(s.part_from_part.linear())};
     // The fixed point nearest to the box centre: (I - R) p = t, solved across the axis.
-    const Eigen::Matrix3d m = Eigen::Matrix3d::Identity() - s.part_from_part.linear() + turn.axis() * turn.axis().transpose();
+    const Eigen::Matrix3d m =
+        Eigen::Matrix3d::Identity() - s.part_from_part.linear() + turn.axis() * turn.axis().transpose();
     const Eigen::Vector3d c = part.box_center();
     const Eigen::Vector3d t = s.part_from_part.translation();
     Eigen::Vector3d p = m.fullPivLu().solve(t - turn.axis() * turn.axis().dot(t));
@@ -54,7 +55,8 @@ std::vector<ContinuousSymmetry> nearly_round_axes(const Part& part) {
     bool known = false;
     for (Axis& a : axes) {
       const Eigen::Vector3d off = p - Eigen::Vector3d(a.line.point);
-      if (std::abs(turn.axis().dot(Eigen::Vector3d(a.line.axis))) < std::cos(3 * kDegree) || off.norm() > 0.03 * part.diameter_mm)
+      if (std::abs(turn.axis().dot(Eigen::Vector3d(a.line.axis))) < std::cos(3 * kDegree) ||
+          off.norm() > 0.03 * part.diameter_mm)
         continue;
       ++a.turns;
       known = true;
@@ -87,7 +89,8 @@ Part compile_part(const Mesh& mesh, const PartOptions& options) {
     moment += area * ((a + b + c) / 3 - Eigen::Vector3d(part.box_center())).squaredNorm();
   }
   if (!(part.area_mm2 > 0) || !(part.diameter_mm > 0))
-    throw Error(ErrorCode::too_little_data, part.name + ": the CAD has no surface (" + std::to_string(mesh.triangles.size()) +
+    throw Error(ErrorCode::too_little_data, part.name + ": the CAD has no surface (" +
+                                                std::to_string(mesh.triangles.size()) +
                                                 " triangles, area 0); a closed or open surface is wanted");
   part.gyration_mm = std::sqrt(moment / part.area_mm2);
 

@@ -10,8 +10,8 @@
 namespace tribin {
 namespace {
 
-constexpr int kViewPixels = 96;       // the part's diameter spans this many pixels: detail of 1 % of the diameter
-constexpr double kViewDistance = 6;   // diameters: near enough to a bin camera's perspective
+constexpr int kViewPixels = 96;      // the part's diameter spans this many pixels: detail of 1 % of the diameter
+constexpr double kViewDistance = 6;  // diameters: near enough to a bin camera's perspective
 constexpr std::size_t kViewPoints = 768;
 
 /// Visits 0..n-1 once each in steps of the golden section, so that every prefix is spread evenly.
@@ -50,12 +50,13 @@ void measure_extents(PartView& view) {
 
 std::vector<Vec3> view_directions() {
   const double g = (1 + std::sqrt(5.0)) / 2;
-  std::vector<Vec3> v = {{-1, g, 0}, {1, g, 0}, {-1, -g, 0}, {1, -g, 0}, {0, -1, g}, {0, 1, g},
-                         {0, -1, -g}, {0, 1, -g}, {g, 0, -1}, {g, 0, 1}, {-g, 0, -1}, {-g, 0, 1}};
+  std::vector<Vec3> v = {{-1, g, 0},  {1, g, 0},  {-1, -g, 0}, {1, -g, 0}, {0, -1, g},  {0, 1, g},
+                         {0, -1, -g}, {0, 1, -g}, {g, 0, -1},  {g, 0, 1},  {-g, 0, -1}, {-g, 0, 1}};
   for (Vec3& p : v) p.normalize();
-  std::vector<std::array<int, 3>> f = {{0, 11, 5}, {0, 5, 1}, {0, 1, 7}, {0, 7, 10}, {0, 10, 11}, {1, 5, 9}, {5, 11, 4},
-                                       {11, 10, 2}, {10, 7, 6}, {7, 1, 8}, {3, 9, 4}, {3, 4, 2}, {3, 2, 6}, {3, 6, 8},
-                                       {3, 8, 9}, {4, 9, 5}, {2, 4, 11}, {6, 2, 10}, {8, 6, 7}, {9, 8, 1}};
+  std::vector<std::array<int, 3>> f = {{0, 11, 5}, {0, 5, 1},  {0, 1, 7},   {0, 7, 10}, {0, 10, 11},
+                                       {1, 5, 9},  {5, 11, 4}, {11, 10, 2}, {10, 7, 6}, {7, 1, 8},
+                                       {3, 9, 4},  {3, 4, 2},  {3, 2, 6},   {3, 6, 8},  {3, 8, 9},
+                                       {4, 9, 5},  {2, 4, 11}, {6, 2, 10},  {8, 6, 7},  {9, 8, 1}};
   for (int level = 0; level < 2; ++level) {
     std::map<std::pair<int, int>, int> middle;
     const auto mid = [&](int a, int b) {
@@ -121,7 +122,8 @@ void make_views(Part& part) {
     for (std::size_t n = 0; n < std::min(order.size(), kViewPoints); ++n) {
       const std::uint32_t p = seen[order[n]];
       const int u = render.u0 + static_cast<int>(p) % render.width, v = render.v0 + static_cast<int>(p) / render.width;
-      view.points.push_back((part_from_camera * Eigen::Vector3d(camera.point(u, v, 1.0 / render.inverse_z[p]))).cast<float>());
+      view.points.push_back(
+          (part_from_camera * Eigen::Vector3d(camera.point(u, v, 1.0 / render.inverse_z[p]))).cast<float>());
       const auto triangle = static_cast<std::size_t>(render.triangle[p]);
       view.normals.push_back((part_from_camera.linear() * render.normal[triangle].cast<double>()).cast<float>());
     }

@@ -8,8 +8,8 @@
 namespace tribin {
 namespace {
 
-// A hard edge between two pixel centres is uniform within one pixel: sd 0.29 px; mixed pixels and the mesh's facets make it
-// about 0.5 px. Neighbouring samples share their pixel's error: their equations count half.
+// A hard edge between two pixel centres is uniform within one pixel: sd 0.29 px; mixed pixels and the mesh's facets
+// make it about 0.5 px. Neighbouring samples share their pixel's error: their equations count half.
 constexpr double kEdgeSigmaPx = 0.5;
 constexpr double kSampleWeight = 0.5;
 constexpr double kSteepest = 0.42;  // cos 65 deg

@@ -8,7 +8,7 @@ namespace tribin {
 namespace {
 
 struct ScreenVertex {
-  float x, y;     ///< window coordinates
+  float x, y;        ///< window coordinates
   float cx, cy, cz;  ///< camera frame
 };
 
@@ -33,8 +33,9 @@ std::vector<OutlineEdge> outline_edges(const RenderMesh& mesh) {
     std::size_t j = i + 1;
     while (j < halves.size() && halves[j].low == halves[i].low && halves[j].high == halves[i].high) ++j;
     OutlineEdge e{{halves[i].low, halves[i].high}, {halves[i].triangle, j > i + 1 ? halves[i + 1].triangle : -1}};
-    const bool coplanar = e.triangles[1] >= 0 && mesh.normals[static_cast<std::size_t>(e.triangles[0])].dot(
-                                                     mesh.normals[static_cast<std::size_t>(e.triangles[1])]) > 0.999999f;
+    const bool coplanar =
+        e.triangles[1] >= 0 && mesh.normals[static_cast<std::size_t>(e.triangles[0])].dot(
+                                   mesh.normals[static_cast<std::size_t>(e.triangles[1])]) > 0.999999f;
     if (!coplanar && j - i <= 2) out.push_back(e);
     i = j;
   }

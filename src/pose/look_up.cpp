@@ -8,8 +8,8 @@
 namespace tribin {
 namespace {
 
-// Normals of a scan's cell and of a facet that are the same surface differ by noise, by curvature across the cell and by the
-// coarse pose: 40 deg keeps them and refuses the neighbouring face of a box.
+// Normals of a scan's cell and of a facet that are the same surface differ by noise, by curvature across the cell and
+// by the coarse pose: 40 deg keeps them and refuses the neighbouring face of a box.
 constexpr float kNormalAgrees = 0.75f;
 
 /// A rotation and translation in floats, for the inner loops.
@@ -43,7 +43,8 @@ Pixel project(const SceneDepth& scene, const Vec3f& q) {
   const float w = 1.f / q[2];
   const float x = static_cast<float>(scene.camera.fx) * q[0] * w + static_cast<float>(scene.camera.cx) + 0.5f;
   const float y = static_cast<float>(scene.camera.fy) * q[1] * w + static_cast<float>(scene.camera.cy) + 0.5f;
-  if (x < 0 || y < 0 || x >= static_cast<float>(scene.z_mm.width) || y >= static_cast<float>(scene.z_mm.height)) return p;
+  if (x < 0 || y < 0 || x >= static_cast<float>(scene.z_mm.width) || y >= static_cast<float>(scene.z_mm.height))
+    return p;
   p.u = static_cast<int>(x);
   p.v = static_cast<int>(y);
   p.inside = true;
@@ -106,7 +107,8 @@ LookUp look_up_early(const SceneDepth& scene, const Pose& camera_from_part, std:
   return out;
 }
 
-Pose settle_depth(const SceneDepth& scene, const Pose& camera_from_part, std::span<const Vec3f> points, std::size_t count) {
+Pose settle_depth(const SceneDepth& scene, const Pose& camera_from_part, std::span<const Vec3f> points,
+                  std::size_t count) {
   const FastPose fast(camera_from_part);
   std::vector<float> shifts;
   for (std::size_t i = 0; i < std::min(count, points.size()); ++i) {
@@ -128,7 +130,8 @@ Pose refine_points(const SceneDepth& scene, const Pose& start, std::span<const V
                    std::span<const Vec3f> normals, std::size_t count, const PointRefineOptions& options) {
   Pose pose = start;
   count = std::min(count, points.size());
-  const double ratio = std::pow(options.end_tolerance_mm / options.start_tolerance_mm, 1.0 / std::max(1, options.iterations - 1));
+  const double ratio =
+      std::pow(options.end_tolerance_mm / options.start_tolerance_mm, 1.0 / std::max(1, options.iterations - 1));
   double tolerance = options.start_tolerance_mm;
   for (int it = 0; it < options.iterations; ++it, tolerance *= ratio) {
     const FastPose fast(pose);
@@ -152,7 +155,8 @@ Pose refine_points(const SceneDepth& scene, const Pose& start, std::span<const V
       const double g = 1 - r * r / (tolerance * tolerance);
       const double w = g * g;  // Tukey's biweight
       const float px = q[0] - c[0], py = q[1] - c[1], pz = q[2] - c[2];
-      const std::array<double, 6> jac = {n[0], n[1], n[2], py * n[2] - pz * n[1], pz * n[0] - px * n[2], px * n[1] - py * n[0]};
+      const std::array<double, 6> jac = {
+          n[0], n[1], n[2], py * n[2] - pz * n[1], pz * n[0] - px * n[2], px * n[1] - py * n[0]};
       std::size_t k = 0;
       for (std::size_t a = 0; a < 6; ++a) {
         b[a] += w * jac[a] * r;

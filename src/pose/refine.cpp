@@ -41,13 +41,15 @@ struct Sums {
 
 constexpr int kBandRows = 16;
 
-/// The outline is left out one rendered pixel wide: there the scan mixes two surfaces and the facet may be the wrong one.
+/// The outline is left out one rendered pixel wide: there the scan mixes two surfaces and the facet may be the wrong
+/// one.
 bool inside_silhouette(const IndexRender& r, int i, int j) {
   if (i == 0 || j == 0 || i + 1 == r.width || j + 1 == r.height) return false;
   const std::size_t k = r.index(i, j);
   const float w = r.inverse_z[k];
   const float jump = 0.004f * w * r.step;  // 0.4 % of the depth a pixel: steeper is an inner outline
-  for (const std::size_t n : {k - 1, k + 1, k - static_cast<std::size_t>(r.width), k + static_cast<std::size_t>(r.width)})
+  for (const std::size_t n :
+       {k - 1, k + 1, k - static_cast<std::size_t>(r.width), k + static_cast<std::size_t>(r.width)})
     if (r.triangle[n] < 0 || std::abs(r.inverse_z[n] - w) > jump) return false;
   return true;
 }
@@ -71,7 +73,7 @@ Sums accumulate(const SceneDepth& scene, const IndexRender& render, const Eigen:
         const double nx = nf[0], ny = nf[1], nz = nf[2];
         const double along = nx * rx + ny * ry + nz;  // n . ray, negative
         const double z_model = 1.0 / render.inverse_z[render.index(i, j)];
-        const double r = (z - z_model) * along;       // signed distance of the scan point from the facet
+        const double r = (z - z_model) * along;  // signed distance of the scan point from the facet
         const double sigma_noise = scene.sigma_mm(u, v) * std::abs(along);
         const double variance = sigma_noise * sigma_noise + cad_sigma_mm * cad_sigma_mm;
         const double e2 = r * r / variance;
@@ -143,9 +145,9 @@ Vec6 solve(const System& s) {
   return x;
 }
 
-// Mixed pixels and the raster shift whole outlines by about a tenth of a pixel, which no number of samples averages away: an outline
-// holds no direction better than that, at the end. Before, it may pull with all its weight, so that it carries the pose over the
-// local minima of surfaces that say little.
+// Mixed pixels and the raster shift whole outlines by about a tenth of a pixel, which no number of samples averages
+// away: an outline holds no direction better than that, at the end. Before, it may pull with all its weight, so that it
+// carries the pose over the local minima of surfaces that say little.
 constexpr double kOutlineBiasPx = 0.1;
 constexpr double kEdgeReachPx = 6;
 
@@ -157,8 +159,8 @@ int add_outlines(Matrix6& information, Vector6& b, const ContourSums& edges, con
   const Eigen::SelfAdjointEigenSolver<Mat6> eigen(outline.h);
   const double share = bias_mm > 0 ? std::min(1.0, 1 / (eigen.eigenvalues()(5) * bias_mm * bias_mm)) : 1.0;
   const System surface = scaled(information, b, frozen, scale);
-  const Eigen::GeneralizedSelfAdjointEigenSolver<Mat6> compared(outline.h * share,
-                                                                surface.h + Mat6::Identity() * 1e-9 * surface.h.trace());
+  const Eigen::GeneralizedSelfAdjointEigenSolver<Mat6> compared(
+      outline.h * share, surface.h + Mat6::Identity() * 1e-9 * surface.h.trace());
   int count = 0;
   for (int k = 0; k < 6; ++k) count += compared.eigenvalues()(k) > 1;
   information += edges.information * share;
@@ -168,13 +170,15 @@ int add_outlines(Matrix6& information, Vector6& b, const ContourSums& edges, con
 
 }  // namespace
 
-Refinement refine_pose(const RenderMesh& mesh, const SceneDepth& scene, const Pose& start, const RefineOptions& options) {
+Refinement refine_pose(const RenderMesh& mesh, const SceneDepth& scene, const Pose& start,
+                       const RefineOptions& options) {
   Refinement out;
   out.camera_from_part = start;
   thread_local IndexRender render;
   // The kernel ends at 3 local sigma (accumulate); the schedule falls below that everywhere.
   const double end_scale = 3 * std::hypot(0.3 * scene.median_sigma_mm, options.cad_sigma_mm);
-  const double ratio = std::pow(std::max(1.0, options.start_scale_mm / end_scale), 1.0 / std::max(1, options.iterations - 2));
+  const double ratio =
+      std::pow(std::max(1.0, options.start_scale_mm / end_scale), 1.0 / std::max(1, options.iterations - 2));
   double scale = options.start_scale_mm;
   double kernel = options.kernel_sigmas;
   Vec6 scale6;
@@ -193,8 +197,9 @@ Refinement refine_pose(const RenderMesh& mesh, const SceneDepth& scene, const Po
     out.rms_mm = sums.weight > 0 ? std::sqrt(sums.squares / sums.weight) : 0;
     out.rms_sigma = sums.weight > 0 ? std::sqrt(sums.squares_sigma / sums.weight) : 0;
     if (sums.pixels < 12) break;
-    // A sensor whose errors on this part are larger than its noise elsewhere (shine, warp) gets a wider kernel, else whole faces
-    // would be dropped in favour of others. Four times, because beyond that it is no longer the same surface.
+    // A sensor whose errors on this part are larger than its noise elsewhere (shine, warp) gets a wider kernel, else
+    // whole faces would be dropped in favour of others. Four times, because beyond that it is no longer the same
+    // surface.
     kernel = options.kernel_sigmas * std::clamp(sums.spread(), 1.0, 4.0);
     Vector6 b;
     for (int a = 0; a < 6; ++a) b[a] = sums.b[static_cast<std::size_t>(a)] * independent;
@@ -214,7 +219,8 @@ Refinement refine_pose(const RenderMesh& mesh, const SceneDepth& scene, const Po
     Pose next = out.camera_from_part;
     const Matrix3 turn = rotation_from_vector(delta.tail<3>());
     next.linear() = turn * out.camera_from_part.linear();
-    next.translation() = turn * (out.camera_from_part.translation() - center) + center + Eigen::Vector3d(delta.head<3>());
+    next.translation() =
+        turn * (out.camera_from_part.translation() - center) + center + Eigen::Vector3d(delta.head<3>());
     out.camera_from_part = next;
     scale /= ratio;
     if (length < 1e-5 && scale <= end_scale) {

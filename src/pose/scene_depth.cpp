@@ -7,9 +7,7 @@
 
 namespace tribin {
 
-double correlation_inflation(double correlation_px) {
-  return std::max(1.0, 4 * kPi * correlation_px * correlation_px);
-}
+double correlation_inflation(double correlation_px) { return std::max(1.0, 4 * kPi * correlation_px * correlation_px); }
 
 SceneDepth make_scene_depth(const Scan& scan, const Surfels& surfels) {
   SceneDepth out;
@@ -33,7 +31,8 @@ SceneDepth make_scene_depth(const Scan& scan, const Surfels& surfels) {
   const int w = scan.width(), h = scan.height();
   out.near_break = Image<std::uint8_t>(w, h, 0);
   const float steepest = 5.7f;  // tan 80 deg
-  const float slope_x = steepest / static_cast<float>(scan.camera.fx), slope_y = steepest / static_cast<float>(scan.camera.fy);
+  const float slope_x = steepest / static_cast<float>(scan.camera.fx),
+              slope_y = steepest / static_cast<float>(scan.camera.fy);
   Image<std::uint8_t> edge(w, h, 0);
   parallel_ranges(h, 64, [&](int begin, int end) {
     for (int v = begin; v < end; ++v) {

@@ -82,11 +82,12 @@ Verification verify_pose(const RenderMesh& mesh, const SceneDepth& scene, const 
       constexpr std::array<std::array<int, 2>, 4> kSides = {{{-1, 0}, {1, 0}, {0, -1}, {0, 1}}};
       for (const auto& d : kSides) {
         const int ii = i + d[0], jj = j + d[1];
-        const bool outside = ii < 0 || jj < 0 || ii >= render.width || jj >= render.height || render.triangle[render.index(ii, jj)] < 0;
+        const bool outside =
+            ii < 0 || jj < 0 || ii >= render.width || jj >= render.height || render.triangle[render.index(ii, jj)] < 0;
         if (!outside) continue;
         ++out.outline;
-        out.outline_breaks += breaks_off(scene, u + d[0] * kOutside * render.step, v + d[1] * kOutside * render.step, n, rho,
-                                         z_model, plane_tolerance, depth_tolerance);
+        out.outline_breaks += breaks_off(scene, u + d[0] * kOutside * render.step, v + d[1] * kOutside * render.step, n,
+                                         rho, z_model, plane_tolerance, depth_tolerance);
       }
     }
   }

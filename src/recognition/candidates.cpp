@@ -19,12 +19,14 @@ struct Scored {
 bool better(const Scored& a, const Scored& b) { return a.score != b.score ? a.score > b.score : a.order < b.order; }
 
 /// The best of each neighbourhood, at most `most`.
-std::vector<Scored> best_apart(const Part& part, std::vector<Scored> all, std::size_t most, double distance, double angle) {
+std::vector<Scored> best_apart(const Part& part, std::vector<Scored> all, std::size_t most, double distance,
+                               double angle) {
   std::sort(all.begin(), all.end(), better);
   std::vector<Scored> out;
   for (const Scored& s : all) {
     if (out.size() >= most) break;
-    if (std::none_of(out.begin(), out.end(), [&](const Scored& o) { return close_poses(part, s.pose, o.pose, distance, angle); }))
+    if (std::none_of(out.begin(), out.end(),
+                     [&](const Scored& o) { return close_poses(part, s.pose, o.pose, distance, angle); }))
       out.push_back(s);
   }
   return out;
@@ -35,7 +37,8 @@ double noise_tolerance(const SceneDepth& scene) { return 4 * scene.median_sigma_
 /// \param settle_from  poses from this one on have a guessed depth: they are moved along the line of sight first.
 std::vector<Scored> look_up_all(const SceneDepth& scene, const Part& part, const std::vector<Pose>& poses,
                                 std::size_t settle_from) {
-  // Half a step of the enumeration at the part's rim: 15 deg / 2 at 0.3 diameters is 3.9 %, its mean over the points 3.5 %.
+  // Half a step of the enumeration at the part's rim: 15 deg / 2 at 0.3 diameters is 3.9 %, its mean over the
+  // points 3.5 %.
   const double tolerance = std::max(0.035 * part.diameter_mm, noise_tolerance(scene));
   constexpr std::size_t kFirst = 24, kAll = 64;
   constexpr double kHopeless = 0.1, kKeep = 0.3;
@@ -56,7 +59,8 @@ std::vector<Scored> look_up_all(const SceneDepth& scene, const Part& part, const
         pose = settle_depth(scene, pose, view.points, kFirst);
         pose = refine_points(scene, pose, view.points, view.normals, 48, o);
       }
-      out[k] = {pose, look_up_early(scene, pose, view.points, view.normals, kFirst, kAll, tolerance, kHopeless).score(), k};
+      out[k] = {pose, look_up_early(scene, pose, view.points, view.normals, kFirst, kAll, tolerance, kHopeless).score(),
+                k};
     }
   });
   std::erase_if(out, [&](const Scored& s) { return s.score < kKeep; });
@@ -136,8 +140,9 @@ namespace {
 
 /// Hypotheses -> look-up -> settled -> rendered, each time fewer.
 /// \param most  that are settled; a seventh of them is rendered.
-std::vector<PoseCandidate> sift(const SceneDepth& scene, const Part& part, int part_index, const std::vector<Pose>& poses,
-                            std::size_t settle_from, std::size_t most, std::vector<Reason>& rejected) {
+std::vector<PoseCandidate> sift(const SceneDepth& scene, const Part& part, int part_index,
+                                const std::vector<Pose>& poses, std::size_t settle_from, std::size_t most,
+                                std::vector<Reason>& rejected) {
   std::vector<Scored> coarse = look_up_all(scene, part, poses, settle_from);
   if (poses.size() > coarse.size())
     add_reason(rejected, {part.name, "hypothesis", "look_up", coarse.empty() ? 0.0 : 0.3, 0.3,
@@ -146,7 +151,8 @@ std::vector<PoseCandidate> sift(const SceneDepth& scene, const Part& part, int p
   std::vector<Scored> settled = settle(scene, part, std::move(coarse));
   settled = best_apart(part, std::move(settled), most / 7, 0.02 * part.diameter_mm, 6 * kDegree);
   // Far behind the best of the whole scan is not worth a rendering.
-  std::erase_if(settled, [best = settled.empty() ? 0 : settled[0].score](const Scored& x) { return x.score < 0.5 * best; });
+  std::erase_if(settled,
+                [best = settled.empty() ? 0 : settled[0].score](const Scored& x) { return x.score < 0.5 * best; });
 
   std::vector<PoseCandidate> out(settled.size());
   parallel_each(static_cast<int>(settled.size()), [&](int i) {
@@ -175,8 +181,8 @@ std::vector<PoseCandidate> sift(const SceneDepth& scene, const Part& part, int p
 
 }  // namespace
 
-std::vector<PoseCandidate> find_candidates(const SceneFeatures& features, SceneDepth& scene, const Part& part, int part_index,
-                                           Source source, std::vector<Reason>& rejected) {
+std::vector<PoseCandidate> find_candidates(const SceneFeatures& features, SceneDepth& scene, const Part& part,
+                                           int part_index, Source source, std::vector<Reason>& rejected) {
   scene.background = background_cells(features, part);
   std::vector<Pose> poses;
   if (source == Source::primitives) {

@@ -32,8 +32,8 @@ enum class Source { primitives, regions, sweep };
 
 /// The candidates of one part in what is not explained yet, best evidence first.
 /// \param scene  its `background` is set for this part.
-std::vector<PoseCandidate> find_candidates(const SceneFeatures& features, SceneDepth& scene, const Part& part, int part_index,
-                                           Source source, std::vector<Reason>& rejected);
+std::vector<PoseCandidate> find_candidates(const SceneFeatures& features, SceneDepth& scene, const Part& part,
+                                           int part_index, Source source, std::vector<Reason>& rejected);
 
 /// Do two poses of one part mean the same placing, up to the look-up's coarse steps?
 bool close_poses(const Part& part, const Pose& a, const Pose& b, double distance_mm, double angle);

@@ -26,10 +26,10 @@ Pose turned(const Pose& pose, const ContinuousSymmetry& line, double angle) {
   return pose * turn;
 }
 
-/// Spins about the axes that the part is nearly round about: the best rendered poses over the whole turn. A search on the
-/// score, because ICP slides past the small features that decide.
+/// Spins about the axes that the part is nearly round about: the best rendered poses over the whole turn. A search on
+/// the score, because ICP slides past the small features that decide.
 void add_spins(const SceneDepth& scene, const Part& part, const Pose& pose, std::vector<Pose>& out) {
-  constexpr int kSpins = 120;          // 3 deg: a hole of 5 % of the diameter at its rim
+  constexpr int kSpins = 120;  // 3 deg: a hole of 5 % of the diameter at its rim
   constexpr std::size_t kBest = 8;
   const int step = step_for(part, scene, pose, kPolishPixels);
   for (const ContinuousSymmetry& axis : part.nearly_round) {
@@ -41,8 +41,9 @@ void add_spins(const SceneDepth& scene, const Part& part, const Pose& pose, std:
       const auto at = [&](int i) { return score[static_cast<std::size_t>((i + kSpins) % kSpins)]; };
       if (at(k) >= at(k - 1) && at(k) > at(k + 1)) maxima.push_back(k);
     }
-    std::stable_sort(maxima.begin(), maxima.end(),
-                     [&](int a, int b) { return score[static_cast<std::size_t>(a)] > score[static_cast<std::size_t>(b)]; });
+    std::stable_sort(maxima.begin(), maxima.end(), [&](int a, int b) {
+      return score[static_cast<std::size_t>(a)] > score[static_cast<std::size_t>(b)];
+    });
     if (maxima.size() > kBest) maxima.resize(kBest);
     for (const int k : maxima) out.push_back(turned(pose, axis, 2 * kPi * k / kSpins));
   }
@@ -89,7 +90,8 @@ void compare(const SceneDepth& scene, const Part& part, int step, std::vector<Fi
 
 int CellMask::shared(const CellMask& other) const {
   int n = 0;
-  for (std::size_t i = 0; i < std::min(bits.size(), other.bits.size()); ++i) n += std::popcount(bits[i] & other.bits[i]);
+  for (std::size_t i = 0; i < std::min(bits.size(), other.bits.size()); ++i)
+    n += std::popcount(bits[i] & other.bits[i]);
   return n;
 }
 
@@ -123,8 +125,10 @@ CellMask mask_of(const Part& part, const SceneDepth& scene, const PoseCandidate&
   return mask;
 }
 
-std::vector<double> log_likelihoods(const SceneDepth& scene, std::span<const std::pair<const Part*, Pose>> poses, int step_px) {
-  // All poses are judged on the union of their windows: what one explains and another does not counts against the other.
+std::vector<double> log_likelihoods(const SceneDepth& scene, std::span<const std::pair<const Part*, Pose>> poses,
+                                    int step_px) {
+  // All poses are judged on the union of their windows: what one explains and another does not counts against the
+  // other.
   constexpr float kUnexplained = 0.5f * 16;  // 4 sigma, and what a pixel costs that no surface explains
   std::vector<IndexRender> renders(poses.size());
   int u0 = scene.camera.width, v0 = scene.camera.height, u1 = -1, v1 = -1;
@@ -192,14 +196,16 @@ Polished polish(const SceneDepth& scene, std::span<const Part> parts, const Pose
       const double start = std::max(0.012 * part.diameter_mm, noise);
       poses[k] = refine_pose(part.render_mesh, scene, poses[k], refine_options(part, few, 3, start)).camera_from_part;
     }
-    checks[k] = verify_pose(part.render_mesh, scene, poses[k], verification_options(part, few, 0.004 * part.diameter_mm));
+    checks[k] =
+        verify_pose(part.render_mesh, scene, poses[k], verification_options(part, few, 0.004 * part.diameter_mm));
   });
   double best = -1e300;
   for (const Verification& v : checks) best = std::max(best, v.gain);
   std::vector<std::size_t> keep;
   for (std::size_t k = 0; k < poses.size(); ++k)
     if (k == 0 || checks[k].gain > 0.85 * best) keep.push_back(k);
-  std::stable_sort(keep.begin(), keep.end(), [&](std::size_t a, std::size_t b) { return checks[a].gain > checks[b].gain; });
+  std::stable_sort(keep.begin(), keep.end(),
+                   [&](std::size_t a, std::size_t b) { return checks[a].gain > checks[b].gain; });
   if (keep.size() > 14) keep.resize(14);
 
   // Fine: the survivors on more pixels, compared by likelihood; those that stay near the best once more on all pixels.
@@ -207,14 +213,17 @@ Polished polish(const SceneDepth& scene, std::span<const Part> parts, const Pose
   for (const std::size_t k : keep) finalists.push_back({poses[k], 0});
   const int fine = step_for(part, scene, candidate.camera_from_part, kPolishPixels);
   if (finalists.size() > 1) compare(scene, part, fine, finalists);
-  std::erase_if(finalists, [best = finalists[0].log_likelihood](const Finalist& f) { return f.log_likelihood < best - kUndecided; });
-  if (finalists.size() > 1) compare(scene, part, step_for(part, scene, candidate.camera_from_part, kDecidePixels), finalists);
+  std::erase_if(finalists, [best = finalists[0].log_likelihood](const Finalist& f) {
+    return f.log_likelihood < best - kUndecided;
+  });
+  if (finalists.size() > 1)
+    compare(scene, part, step_for(part, scene, candidate.camera_from_part, kDecidePixels), finalists);
 
   Polished out;
   out.candidate = candidate;
   out.candidate.camera_from_part = finalists[0].pose;
-  out.candidate.verification =
-      verify_pose(part.render_mesh, scene, finalists[0].pose, verification_options(part, fine, 0.002 * part.diameter_mm));
+  out.candidate.verification = verify_pose(part.render_mesh, scene, finalists[0].pose,
+                                           verification_options(part, fine, 0.002 * part.diameter_mm));
   out.log_likelihood = finalists[0].log_likelihood;
   out.mask = mask_of(part, scene, out.candidate);
   for (const Finalist& f : finalists)

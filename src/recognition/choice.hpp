@@ -27,9 +27,10 @@ struct Polished {
 /// The cells whose pixels a rendered pose supports.
 CellMask mask_of(const Part& part, const SceneDepth& scene, const PoseCandidate& candidate);
 
-/// Log-likelihood of the scan where any of the poses predicts something: each pixel's residual in its local sigma, bounded
-/// at 4 sigma, over the equivalent number of independent pixels. Only differences between poses mean something.
-std::vector<double> log_likelihoods(const SceneDepth& scene, std::span<const std::pair<const Part*, Pose>> poses, int step_px);
+/// Log-likelihood of the scan where any of the poses predicts something: each pixel's residual in its local sigma,
+/// bounded at 4 sigma, over the equivalent number of independent pixels. Only differences between poses mean something.
+std::vector<double> log_likelihoods(const SceneDepth& scene, std::span<const std::pair<const Part*, Pose>> poses,
+                                    int step_px);
 
 Polished polish(const SceneDepth& scene, std::span<const Part> parts, const PoseCandidate& candidate);
 

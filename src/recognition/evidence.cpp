@@ -85,7 +85,8 @@ void describe_evidence(const Part& part, const SceneDepth& scene, const SceneFea
       }
       const double slant = std::abs(n.dot(ray));
       const double sigma = std::hypot(scene.sigma_mm(u, v) * slant, part.mesh.chord_error_mm);
-      // A measurement free of its nominal value may lie off it: 5 sigma plus 1 % of the part, where a wrong part would show.
+      // A measurement free of its nominal value may lie off it: 5 sigma plus 1 % of the part, where a wrong part would
+      // show.
       if (std::abs(r) > 5 * sigma + 0.01 * part.diameter_mm) continue;
       const double w = 1 / (sigma * sigma);
       fit.h += w * jac * jac.transpose();
@@ -100,8 +101,7 @@ void describe_evidence(const Part& part, const SceneDepth& scene, const SceneFea
         }
       }
     }
-  const double inflation =
-      std::max(1.0, correlation_inflation(scene.correlation_px) / (double(step) * step));
+  const double inflation = std::max(1.0, correlation_inflation(scene.correlation_px) / (double(step) * step));
   for (std::size_t k = 0; k < count; ++k) {
     const Fit& fit = fits[k];
     if (fit.pixels < 40) continue;  // fewer say nothing of a surface

@@ -5,7 +5,8 @@
 
 namespace tribin {
 
-SceneFeatures make_scene_features(const Primitives& primitives, const PrimitiveModel& observation, const Surfels& surfels) {
+SceneFeatures make_scene_features(const Primitives& primitives, const PrimitiveModel& observation,
+                                  const Surfels& surfels) {
   SceneFeatures out;
   out.observation = &observation;
   out.surfels = &surfels;

@@ -6,8 +6,9 @@
 #include "tribin/part/part.hpp"
 #include "tribin/pose/scene_depth.hpp"
 
-// Hypotheses: poses of a part that some primitives of the scan suggest. They are many and cheap; the look-up in the depth
-// image decides which are worth more work. Every generator writes into one list, in an order that depends on the input alone.
+// Hypotheses: poses of a part that some primitives of the scan suggest. They are many and cheap; the look-up in the
+// depth image decides which are worth more work. Every generator writes into one list, in an order that depends on the
+// input alone.
 namespace tribin {
 
 /// A scene primitive with what the generators need to know of it.
@@ -19,17 +20,18 @@ struct SceneFeature {
 
 /// The scene as the generators see it.
 struct SceneFeatures {
-  std::vector<SceneFeature> features;          ///< one a primitive of the observation, same order
+  std::vector<SceneFeature> features;  ///< one a primitive of the observation, same order
   const PrimitiveModel* observation = nullptr;
   const Surfels* surfels = nullptr;
   const Primitives* primitives = nullptr;
-  Image<std::uint8_t> claimed;                 ///< cells that an accepted instance explains; empty = none
+  Image<std::uint8_t> claimed;  ///< cells that an accepted instance explains; empty = none
 };
 
 /// Marks cells as explained and drops the features that lie in them.
 void claim_cells(SceneFeatures& scene, const std::vector<std::uint64_t>& bits);
 
-SceneFeatures make_scene_features(const Primitives& primitives, const PrimitiveModel& observation, const Surfels& surfels);
+SceneFeatures make_scene_features(const Primitives& primitives, const PrimitiveModel& observation,
+                                  const Surfels& surfels);
 
 /// A plane or cylinder of the CAD with what the generators need to know of it.
 struct PartFeature {
@@ -51,7 +53,8 @@ Image<std::uint8_t> background_cells(const SceneFeatures& scene, const Part& par
 void hypotheses_from_cylinders(const SceneFeatures& scene, const Part& part, std::vector<Pose>& out);
 /// One plane: spins and places of the seen piece on the CAD's face. Leaves 3 of 6 to the enumeration.
 void hypotheses_from_planes(const SceneFeatures& scene, const Part& part, std::vector<Pose>& out);
-/// Two planes, two cylinders, or a plane and a cylinder whose angle, distance and radii agree: leaves at most a slide or a spin.
+/// Two planes, two cylinders, or a plane and a cylinder whose angle, distance and radii agree: leaves at most a slide
+/// or a spin.
 void hypotheses_from_pairs(const SceneFeatures& scene, const Part& part, std::vector<Pose>& out);
 /// A region that no background explains, of the part's size: every view in every spin, centred on it.
 /// \source the paper's "distance based classifier in 2-D image space" (III-B), on what the other spaces leave.
@@ -60,12 +63,12 @@ void hypotheses_from_regions(const SceneFeatures& scene, const Part& part, std::
 /// Is a region left that could be a piece of the part?
 bool anything_left(const SceneFeatures& scene, const Part& part);
 
-/// The same where regions are larger than the part (heaps, touching parts, noise): every view in every spin at places spread over
-/// all that no background explains. Tens of thousands of poses; the last resort.
+/// The same where regions are larger than the part (heaps, touching parts, noise): every view in every spin at places
+/// spread over all that no background explains. Tens of thousands of poses; the last resort.
 void hypotheses_from_sweep(const SceneFeatures& scene, const Part& part, std::vector<Pose>& out);
 
-/// Rotation that turns frame (x, y) of the part onto that of the camera: camera_from_part with R x_part = x_camera and the
-/// y of both in one half plane.
+/// Rotation that turns frame (x, y) of the part onto that of the camera: camera_from_part with R x_part = x_camera and
+/// the y of both in one half plane.
 Matrix3 rotation_from_directions(const Vec3& x_part, const Vec3& y_part, const Vec3& x_camera, const Vec3& y_camera);
 
 /// The pose with this rotation that brings a part's point onto a camera's point.

@@ -6,12 +6,13 @@
 // What is said of an accepted pose: its covariance, what stays free or weak, and the evidence primitive by primitive.
 namespace tribin {
 
-/// Directions (mm, rad about the box centre, camera axes) along which the part's own symmetry leaves the pose free; unit when
-/// radians count `part.gyration_mm`.
+/// Directions (mm, rad about the box centre, camera axes) along which the part's own symmetry leaves the pose free;
+/// unit when radians count `part.gyration_mm`.
 std::vector<Vector6> free_directions_about_center(const Part& part, const Pose& camera_from_part);
 
 /// Fills covariance, free and weak directions from the information of the final refinement.
-void describe_uncertainty(const Part& part, const NoiseProfile& noise, const Refinement& refinement, Instance& instance);
+void describe_uncertainty(const Part& part, const NoiseProfile& noise, const Refinement& refinement,
+                          Instance& instance);
 
 /// Fills evidence: each primitive of the part that enough pixels show, measured without its nominal value.
 void describe_evidence(const Part& part, const SceneDepth& scene, const SceneFeatures& features, Instance& instance);

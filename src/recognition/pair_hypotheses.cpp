@@ -12,20 +12,22 @@ constexpr double kAngleTolerance = 3 * kDegree;
 
 bool radius_near(const Primitive& seen, const Primitive& nominal) {
   const double sigma = std::sqrt(std::max(0.0, seen.covariance(4, 4)));
-  return seen.concave == nominal.concave &&
-         std::abs(seen.radius_mm - nominal.radius_mm) < 0.04 * nominal.radius_mm + std::min(5 * sigma, 0.2 * nominal.radius_mm);
+  return seen.concave == nominal.concave && std::abs(seen.radius_mm - nominal.radius_mm) <
+                                                0.04 * nominal.radius_mm + std::min(5 * sigma, 0.2 * nominal.radius_mm);
 }
 
 Eigen::Vector3d middle_of(const Primitive& p) { return Vec3(p.point + p.axis * (0.5 * (p.extent_min + p.extent_max))); }
 
 /// Two faces: rotation fixed, places of both along their normals fixed, a slide along the edge direction left.
-void plane_plane(const SceneFeatures& scene, const Part& part, const std::vector<PartFeature>& faces, std::vector<Pose>& out) {
+void plane_plane(const SceneFeatures& scene, const Part& part, const std::vector<PartFeature>& faces,
+                 std::vector<Pose>& out) {
   const double step = 0.05 * part.diameter_mm;
   for (std::size_t i = 0; i < scene.features.size(); ++i)
     for (std::size_t j = i + 1; j < scene.features.size(); ++j) {
       const SceneFeature &fa = scene.features[i], &fb = scene.features[j];
       const Primitive &a = *fa.primitive, &b = *fb.primitive;
-      if (a.type != PrimitiveType::plane || b.type != PrimitiveType::plane || is_background(fa, part) || is_background(fb, part))
+      if (a.type != PrimitiveType::plane || b.type != PrimitiveType::plane || is_background(fa, part) ||
+          is_background(fb, part))
         continue;
       if ((fa.centroid - fb.centroid).norm() > part.diameter_mm) continue;
       const double angle = std::acos(std::clamp(a.axis.dot(b.axis), -1.0, 1.0));
@@ -38,7 +40,8 @@ void plane_plane(const SceneFeatures& scene, const Part& part, const std::vector
           if (a.area_mm2 > 1.3 * p.area_mm2 || b.area_mm2 > 1.3 * q.area_mm2) continue;
           // Do they bend the same way? The neighbour's centroid lies below (convex) or above (concave) the first face.
           const double seen_side = a.axis.dot(fb.centroid - fa.centroid), cad_side = p.axis.dot(q.point - p.point);
-          if (seen_side * cad_side < 0 && std::min(std::abs(seen_side), std::abs(cad_side)) > 0.05 * part.diameter_mm) continue;
+          if (seen_side * cad_side < 0 && std::min(std::abs(seen_side), std::abs(cad_side)) > 0.05 * part.diameter_mm)
+            continue;
           const Matrix3 r = rotation_from_directions(p.axis, q.axis, a.axis, b.axis);
           // Translation: on both planes, and the centroids' slide along the common edge.
           const Eigen::Vector3d edge = Eigen::Vector3d(a.axis).cross(Eigen::Vector3d(b.axis)).normalized();
@@ -48,7 +51,8 @@ void plane_plane(const SceneFeatures& scene, const Part& part, const std::vector
           for (int s = -2; s <= 2; ++s) {
             Eigen::Vector3d rhs;
             rhs << a.axis.dot(fa.centroid) - a.axis.dot(Vec3(rp)), b.axis.dot(fb.centroid) - b.axis.dot(Vec3(rq)),
-                0.5 * (edge.dot(Eigen::Vector3d(fa.centroid) - rp) + edge.dot(Eigen::Vector3d(fb.centroid) - rq)) + s * step;
+                0.5 * (edge.dot(Eigen::Vector3d(fa.centroid) - rp) + edge.dot(Eigen::Vector3d(fb.centroid) - rq)) +
+                    s * step;
             Pose pose = Pose::Identity();
             pose.linear() = r;
             pose.translation() = m.inverse() * rhs;
@@ -58,7 +62,8 @@ void plane_plane(const SceneFeatures& scene, const Part& part, const std::vector
     }
 }
 
-/// Two cylinders: skew or crossing axes fix all, parallel ones leave a slide, coaxial ones nothing that one did not give.
+/// Two cylinders: skew or crossing axes fix all, parallel ones leave a slide, coaxial ones nothing that one did not
+/// give.
 void cylinder_cylinder(const SceneFeatures& scene, const Part& part, const std::vector<PartFeature>& cylinders,
                        std::vector<Pose>& out) {
   const double step = 0.05 * part.diameter_mm;
@@ -68,7 +73,8 @@ void cylinder_cylinder(const SceneFeatures& scene, const Part& part, const std::
       const SceneFeature &fa = scene.features[i], &fb = scene.features[j];
       const Primitive &a = *fa.primitive, &b = *fb.primitive;
       if (a.type != PrimitiveType::cylinder || b.type != PrimitiveType::cylinder) continue;
-      if (is_background(fa, part) || is_background(fb, part) || (fa.centroid - fb.centroid).norm() > part.diameter_mm) continue;
+      if (is_background(fa, part) || is_background(fb, part) || (fa.centroid - fb.centroid).norm() > part.diameter_mm)
+        continue;
       const Eigen::Vector3d ma = middle_of(a), mb = middle_of(b);
       for (const PartFeature& na : cylinders) {
         const Primitive& p = *na.primitive;
@@ -77,7 +83,8 @@ void cylinder_cylinder(const SceneFeatures& scene, const Part& part, const std::
           const Primitive& q = *nb.primitive;
           if (&p == &q || !radius_near(b, q)) continue;
           const double seen_cos = std::abs(a.axis.dot(b.axis)), cad_cos = std::abs(p.axis.dot(q.axis));
-          if (std::abs(std::acos(std::min(1.0, seen_cos)) - std::acos(std::min(1.0, cad_cos))) > kAngleTolerance) continue;
+          if (std::abs(std::acos(std::min(1.0, seen_cos)) - std::acos(std::min(1.0, cad_cos))) > kAngleTolerance)
+            continue;
           const Eigen::Vector3d mp = middle_of(p), mq = middle_of(q);
           const auto across = [](const Eigen::Vector3d& axis, const Eigen::Vector3d& d) -> Eigen::Vector3d {
             return d - axis * axis.dot(d);
@@ -86,7 +93,8 @@ void cylinder_cylinder(const SceneFeatures& scene, const Part& part, const std::
           const bool parallel = cad_cos > std::cos(10 * kDegree);
           if (parallel) {
             // The paper's v1 and v3: the axis, and the offset across it.
-            if (cad_off.norm() < 0.05 * part.diameter_mm || std::abs(seen_off.norm() - cad_off.norm()) > 0.03 * part.diameter_mm)
+            if (cad_off.norm() < 0.05 * part.diameter_mm ||
+                std::abs(seen_off.norm() - cad_off.norm()) > 0.03 * part.diameter_mm)
               continue;
             for (const double sign : {1.0, -1.0}) {
               const Matrix3 r = rotation_from_directions(p.axis, Vec3(cad_off), a.axis * sign, Vec3(seen_off));
@@ -143,7 +151,8 @@ void cylinder_plane(const SceneFeatures& scene, const Part& part, const std::vec
             orthonormal_basis(p.axis, pu, pv);
             orthonormal_basis(a.axis, su, sv);
             // Both axes, cut with both faces: the paper's intersection point of a plane and a cylinder's axis.
-            const auto cut = [](const Eigen::Vector3d& o, const Eigen::Vector3d& d, const Primitive& face, const Vec3& on) {
+            const auto cut = [](const Eigen::Vector3d& o, const Eigen::Vector3d& d, const Primitive& face,
+                                const Vec3& on) {
               const Eigen::Vector3d n = face.axis;
               return Vec3(o + d * (n.dot(Eigen::Vector3d(on) - o) / n.dot(d)));
             };

@@ -12,8 +12,8 @@
 namespace tribin {
 namespace {
 
-// Two candidates that explain more than this share of the smaller one's cells cannot both be there: touching parts share
-// only cells along their common edge.
+// Two candidates that explain more than this share of the smaller one's cells cannot both be there: touching parts
+// share only cells along their common edge.
 constexpr double kOverlap = 0.3;
 
 // A place and class less likely than this is kept back: a robot that trusts it would miss twice in five picks.
@@ -24,21 +24,24 @@ double overlap(const CellMask& a, const CellMask& b) {
   return smaller > 0 ? double(a.shared(b)) / smaller : 0;
 }
 
-/// Probability that an accepted verification is right: how far its fit and outline stand above the limits of acceptance.
-/// \source ours, uncalibrated as yet: a logistic with its half at the limits and 0.98 at a clean fit of 0.9 and outline of 0.9.
+/// Probability that an accepted verification is right: how far its fit and outline stand above the limits of
+/// acceptance. \source ours, uncalibrated as yet: a logistic with its half at the limits and 0.98 at a clean fit of 0.9
+/// and outline of 0.9.
 double probability(const Verification& v) {
   const double x = 8 * (v.fit() - 0.45) + 4 * (v.contour() - 0.5) - 10 * v.free_space();
   return 1 / (1 + std::exp(-x));
 }
 
-/// Probability that a 3-D error of rms length `rms` stays below a limit: Maxwell's distribution, its axes taken as equal.
+/// Probability that a 3-D error of rms length `rms` stays below a limit: Maxwell's distribution, its axes taken as
+/// equal.
 double probability_below(double limit, double rms) {
   if (!(rms > 0)) return 1;
   const double x = limit * std::sqrt(3.0) / rms;
   return std::erf(x / std::sqrt(2.0)) - std::sqrt(2 / kPi) * x * std::exp(-0.5 * x * x);
 }
 
-/// Root mean squares of the errors that the covariance predicts: of the box centre's place [mm], and of the rotation [rad].
+/// Root mean squares of the errors that the covariance predicts: of the box centre's place [mm], and of the rotation
+/// [rad].
 std::pair<double, double> predicted_errors(const Part& part, const Instance& instance) {
   const Eigen::Matrix<double, 6, 6> c = instance.covariance;
   const Eigen::Vector3d arm = instance.camera_from_part.linear() * Eigen::Vector3d(part.box_center());
@@ -48,14 +51,16 @@ std::pair<double, double> predicted_errors(const Part& part, const Instance& ins
   return {std::sqrt((j * c * j.transpose()).trace()), std::sqrt(c.bottomRightCorner<3, 3>().trace())};
 }
 
-Instance make_instance(const Polished& p, std::span<const Part> parts, const SceneDepth& scene, const SceneFeatures& features,
-                       const NoiseProfile& noise, const RecognitionOptions& recognition) {
+Instance make_instance(const Polished& p, std::span<const Part> parts, const SceneDepth& scene,
+                       const SceneFeatures& features, const NoiseProfile& noise,
+                       const RecognitionOptions& recognition) {
   const Part& part = parts[static_cast<std::size_t>(p.candidate.part)];
   Instance out;
   out.part = part.name;
-  // The last word: every pixel, up to 60 000 (more gain nothing against systematic terms), and every second one where the noise
-  // is so correlated that its neighbours repeat it (neighbour correlation over 0.6).
-  const int step = std::max(scene.correlation_px >= 0.7 ? 2 : 1, step_for(part, scene, p.candidate.camera_from_part, 60000));
+  // The last word: every pixel, up to 60 000 (more gain nothing against systematic terms), and every second one where
+  // the noise is so correlated that its neighbours repeat it (neighbour correlation over 0.6).
+  const int step =
+      std::max(scene.correlation_px >= 0.7 ? 2 : 1, step_for(part, scene, p.candidate.camera_from_part, 60000));
   RefineOptions options = refine_options(part, step, 3, std::max(0.002 * part.diameter_mm, 4 * scene.median_sigma_mm));
   options.outlines = true;
   options.frozen = free_directions_about_center(part, p.candidate.camera_from_part);
@@ -64,10 +69,12 @@ Instance make_instance(const Polished& p, std::span<const Part> parts, const Sce
   describe_uncertainty(part, noise, refined, out);
   describe_evidence(part, scene, features, out);
 
-  // Rivals by likelihood: those that keep 1 % are told. Errors of a scan that are common to whole faces, and rasters that fall
-  // otherwise, move a log-likelihood by a few nats where nothing decides; what decides moves it by hundreds.
+  // Rivals by likelihood: those that keep 1 % are told. Errors of a scan that are common to whole faces, and rasters
+  // that fall otherwise, move a log-likelihood by a few nats where nothing decides; what decides moves it by hundreds.
   constexpr double kTemperature = 3;
-  const auto weight = [&](double likelihood) { return std::exp(std::min(0.0, likelihood - p.log_likelihood) / kTemperature); };
+  const auto weight = [&](double likelihood) {
+    return std::exp(std::min(0.0, likelihood - p.log_likelihood) / kTemperature);
+  };
   double sum = 1;
   for (const auto& [pose, likelihood] : p.others) sum += weight(likelihood);
   for (const auto& [pose, likelihood] : p.others) {
@@ -87,7 +94,8 @@ Instance make_instance(const Polished& p, std::span<const Part> parts, const Sce
   for (const Alternative& a : out.alternatives) main -= a.probability;
   const auto [place, turn] = predicted_errors(part, out);
   // "Found" is 5 % of the diameter at the rim, half a diameter from the centre.
-  out.score = probability(v) * probability_below(0.05 * part.diameter_mm, std::hypot(place, turn * 0.5 * part.diameter_mm)) * main;
+  out.score = probability(v) *
+              probability_below(0.05 * part.diameter_mm, std::hypot(place, turn * 0.5 * part.diameter_mm)) * main;
   if (recognition.tolerance_mm > 0 || recognition.tolerance_rad > 0) {
     double within = out.score;
     if (recognition.tolerance_mm > 0) within *= probability_below(recognition.tolerance_mm, place);
@@ -98,8 +106,8 @@ Instance make_instance(const Polished& p, std::span<const Part> parts, const Sce
 }
 
 /// Best first: each place of the scan goes to the pose, of any part, that explains it best.
-std::vector<Polished> choose(const SceneDepth& scene, std::span<const Part> parts, std::vector<PoseCandidate> candidates,
-                             std::vector<Reason>& rejected) {
+std::vector<Polished> choose(const SceneDepth& scene, std::span<const Part> parts,
+                             std::vector<PoseCandidate> candidates, std::vector<Reason>& rejected) {
   std::stable_sort(candidates.begin(), candidates.end(), [](const PoseCandidate& a, const PoseCandidate& b) {
     return a.verification.gain > b.verification.gain;
   });
@@ -147,8 +155,8 @@ std::vector<Polished> choose(const SceneDepth& scene, std::span<const Part> part
     if (!acceptable(part, winner.candidate.verification, rejected)) continue;
     for (std::size_t k = 0; k < polished.size(); ++k)
       if (k != best)
-        add_reason(rejected, {parts[static_cast<std::size_t>(polished[k].candidate.part)].name, "selection", "log_likelihood",
-                              likelihood[k] - likelihood[best], 0});
+        add_reason(rejected, {parts[static_cast<std::size_t>(polished[k].candidate.part)].name, "selection",
+                              "log_likelihood", likelihood[k] - likelihood[best], 0});
     claimed.join(winner.mask);
     winners.push_back(std::move(winner));
   }
@@ -166,7 +174,8 @@ Instances recognize(const Primitives& primitives, const PrimitiveModel& observat
 
   const auto start = std::chrono::steady_clock::now();
   const auto late = [&] {
-    return options.time_limit_ms > 0 && std::chrono::steady_clock::now() - start > std::chrono::milliseconds(options.time_limit_ms);
+    return options.time_limit_ms > 0 &&
+           std::chrono::steady_clock::now() - start > std::chrono::milliseconds(options.time_limit_ms);
   };
   // Rounds on what is left: primitives first, as long as they lead to parts; then regions; then the sweep.
   for (const Source source : {Source::primitives, Source::regions, Source::sweep}) {
@@ -194,7 +203,8 @@ Instances recognize(const Primitives& primitives, const PrimitiveModel& observat
       if (winners.empty()) break;
     }
   }
-  std::stable_sort(out.items.begin(), out.items.end(), [](const Instance& a, const Instance& b) { return a.score > b.score; });
+  std::stable_sort(out.items.begin(), out.items.end(),
+                   [](const Instance& a, const Instance& b) { return a.score > b.score; });
   for (std::size_t i = 0; i < out.items.size(); ++i) out.items[i].id = static_cast<int>(i) + 1;
   out.unexplained = std::any_of(parts.begin(), parts.end(), [&](const Part& p) { return anything_left(features, p); });
   return out;

@@ -44,7 +44,8 @@ namespace {
 /// Local sd of z at a cell [mm].
 double local_sigma(const Surfels& surfels, std::size_t cell) {
   const Image<float>& tiles = surfels.local_sigma_mm;
-  const int i = static_cast<int>(cell) % surfels.surfel_of_cell.width, j = static_cast<int>(cell) / surfels.surfel_of_cell.width;
+  const int i = static_cast<int>(cell) % surfels.surfel_of_cell.width,
+            j = static_cast<int>(cell) / surfels.surfel_of_cell.width;
   return tiles(std::min(i / 8, tiles.width - 1), std::min(j / 8, tiles.height - 1));
 }
 
@@ -54,12 +55,14 @@ Image<std::uint8_t> background_cells(const SceneFeatures& scene, const Part& par
   const std::vector<bool> background = background_flags(scene, part);
   const Image<std::int32_t>& grid = scene.surfels->surfel_of_cell;
   Image<std::uint8_t> out(grid.width, grid.height, 0);
-  // Noise that hides 6 % of the part's size (4 sigma) lets everything look like it: such places say nothing of this part.
+  // Noise that hides 6 % of the part's size (4 sigma) lets everything look like it: such places say nothing of this
+  // part.
   const double loudest = 0.015 * part.diameter_mm;
   for (std::size_t i = 0; i < grid.size(); ++i)
     if (grid.data[i] >= 0)
-      out.data[i] = local_sigma(*scene.surfels, i) > loudest || (!scene.claimed.empty() && scene.claimed.data[i]) || background[static_cast<std::size_t>(
-          scene.primitives->label_of_surfel[static_cast<std::size_t>(grid.data[i])])];
+      out.data[i] = local_sigma(*scene.surfels, i) > loudest || (!scene.claimed.empty() && scene.claimed.data[i]) ||
+                    background[static_cast<std::size_t>(
+                        scene.primitives->label_of_surfel[static_cast<std::size_t>(grid.data[i])])];
   return out;
 }
 
@@ -95,8 +98,10 @@ std::vector<Region> regions(const SceneFeatures& scene, const Part& part) {
           }
       }
       // A crumb: less than a seventh of what the part shows on average is the rim of something explained.
-      const double pitch = surfels.position[static_cast<std::size_t>(members[0])].z() / surfels.scan->camera.fx * surfels.cell_px;
-      if (members.size() < 20 || static_cast<double>(members.size()) * pitch * pitch < mean_view_area(part) / 7) continue;
+      const double pitch =
+          surfels.position[static_cast<std::size_t>(members[0])].z() / surfels.scan->camera.fx * surfels.cell_px;
+      if (members.size() < 20 || static_cast<double>(members.size()) * pitch * pitch < mean_view_area(part) / 7)
+        continue;
       Region r;
       r.surfels = members;
       Eigen::Vector3d sum = Eigen::Vector3d::Zero();
@@ -145,7 +150,8 @@ void hypotheses_from_regions(const SceneFeatures& scene, const Part& part, std::
         const Vec3 part_u = pu * std::cos(a) + pv * std::sin(a), part_v = pv * std::cos(a) - pu * std::sin(a);
         const Matrix3 r = rotation_from_directions(view.direction, part_u, region.toward, region.u);
         const Vec3 part_point = part_u * along_u.mean() + part_v * along_v.mean() - view.direction * middle_depth;
-        const Vec3 scene_point = region.u * region.along_u.mean() + region.v * region.along_v.mean() - region.toward * region.depth;
+        const Vec3 scene_point =
+            region.u * region.along_u.mean() + region.v * region.along_v.mean() - region.toward * region.depth;
         out.push_back(pose_from(r, part_point, scene_point));
       }
     }
@@ -163,7 +169,8 @@ void hypotheses_from_sweep(const SceneFeatures& scene, const Part& part, std::ve
   for (const Region& region : regions(scene, part))
     for (const std::int32_t s : region.surfels) {
       const Vec3 p = surfels.position[static_cast<std::size_t>(s)].cast<double>();
-      if (std::none_of(anchors.begin(), anchors.end(), [&](const Vec3& a) { return (a - p).squaredNorm() < spacing * spacing; }))
+      if (std::none_of(anchors.begin(), anchors.end(),
+                       [&](const Vec3& a) { return (a - p).squaredNorm() < spacing * spacing; }))
         anchors.push_back(p);
     }
   for (const Vec3& anchor : anchors) {

@@ -10,7 +10,8 @@ namespace {
 // 15 deg between spins: the look-up tolerates half of that at the rim of a part (3.5 % of the diameter).
 constexpr int kSpins = 24;
 
-/// Radii that can be one: 5 sigma of the measured one and 2 % for castings and facets, as the free radius is only a check.
+/// Radii that can be one: 5 sigma of the measured one and 2 % for castings and facets, as the free radius is only a
+/// check.
 bool radius_agrees(const Primitive& seen, const Primitive& nominal) {
   const double sigma = std::sqrt(std::max(0.0, seen.covariance(4, 4)));
   const double limit = std::min(5 * sigma, 0.25 * nominal.radius_mm) + 0.02 * nominal.radius_mm;
@@ -21,7 +22,8 @@ bool spins_freely(const Part& part, const Primitive& p) {
   for (const ContinuousSymmetry& s : part.symmetry.continuous) {
     const Eigen::Vector3d axis = s.axis;
     const Eigen::Vector3d off = Eigen::Vector3d(p.point) - Eigen::Vector3d(s.point);
-    if (std::abs(axis.dot(Eigen::Vector3d(p.axis))) > 0.9999 && off.cross(axis).norm() < 0.01 * part.diameter_mm) return true;
+    if (std::abs(axis.dot(Eigen::Vector3d(p.axis))) > 0.9999 && off.cross(axis).norm() < 0.01 * part.diameter_mm)
+      return true;
   }
   return false;
 }

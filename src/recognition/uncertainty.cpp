@@ -40,7 +40,8 @@ std::vector<Vector6> free_directions_about_center(const Part& part, const Pose& 
   return out;
 }
 
-void describe_uncertainty(const Part& part, const NoiseProfile& noise, const Refinement& refinement, Instance& instance) {
+void describe_uncertainty(const Part& part, const NoiseProfile& noise, const Refinement& refinement,
+                          Instance& instance) {
   const double lever = part.gyration_mm;
   Vec6 scale;
   scale << 1, 1, 1, 1 / lever, 1 / lever, 1 / lever;
@@ -55,7 +56,8 @@ void describe_uncertainty(const Part& part, const NoiseProfile& noise, const Ref
   h = keep * h * keep;
   const Eigen::SelfAdjointEigenSolver<Mat6> eigen(h);
   const std::size_t free_count = part.symmetry.continuous.size();
-  // Weak: not held better than 1 % of the diameter, a fifth of what counts as found. Such a direction keeps that spread at least.
+  // Weak: not held better than 1 % of the diameter, a fifth of what counts as found. Such a direction keeps that spread
+  // at least.
   const double weak_limit = 0.01 * part.diameter_mm;
   Mat6 covariance = Mat6::Zero();
   for (int k = static_cast<int>(free_count); k < 6; ++k) {

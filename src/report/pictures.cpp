@@ -157,7 +157,7 @@ std::string scan_solids(const Observation& seen, const Sighting& where, const Vi
   std::string out;
   {
     ShadedSurface cloud = surface_of(seen.scan, seen.surfels, where, stride,
-                               [&](int u, int v) { return on_part(where, u, v) ? PixelLook{} : out_of_sight; });
+                                     [&](int u, int v) { return on_part(where, u, v) ? PixelLook{} : out_of_sight; });
     const Height height = height_over(seen, cloud);
     paint_heights(cloud, height);
     Canvas canvas(view);

@@ -123,7 +123,7 @@ Vec3f normal_at(const Grid& grid, const Surfels& surfels, int u, int v, int i, i
 }  // namespace
 
 ShadedSurface surface_of(const Scan& scan, const Surfels& surfels, const Sighting& where, int stride,
-                   const std::function<PixelLook(int u, int v)>& look) {
+                         const std::function<PixelLook(int u, int v)>& look) {
   const Grid grid = grid_of(scan, where, stride);
   ShadedSurface out;
   std::vector<std::int64_t> vertex(grid.points.size(), -1);

@@ -29,6 +29,6 @@ struct PixelLook {
 
 /// The scan inside a rectangle as triangles, every `stride` pixels; holes stay holes, depth edges are not bridged.
 ShadedSurface surface_of(const Scan& scan, const Surfels& surfels, const Sighting& where, int stride,
-                   const std::function<PixelLook(int u, int v)>& look);
+                         const std::function<PixelLook(int u, int v)>& look);
 
 }  // namespace tribin::report

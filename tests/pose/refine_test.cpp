@@ -55,7 +55,8 @@ TEST(RefinePose, MeetsTheTruthWithinTheNoise) {
     const Refinement refined = refine_pose(render_mesh, scene, moved(truth, off), options);
     const Eigen::Vector3d error = refined.camera_from_part.translation() - truth.translation();
     const double turn = rotation_angle(refined.camera_from_part.linear(), truth.linear());
-    // Five standard deviations of its own information, and the outline's raster along the directions that one face leaves open.
+    // Five standard deviations of its own information, and the outline's raster along the directions that one face
+    // leaves open.
     const Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>(refined.information).inverse();
     EXPECT_LT(error.norm(), 5 * std::sqrt(covariance.topLeftCorner<3, 3>().trace()) + 0.02);
     EXPECT_LT(turn, 5 * std::sqrt(covariance.bottomRightCorner<3, 3>().trace()) + 0.02 * kDegree);

@@ -10,10 +10,11 @@
 
 namespace tribin::test {
 
-/// A scan of meshes at known poses above a table (a plane n . p = rho, n towards the camera), with correlated noise. No shadow,
-/// no drop-out: what is measured is the method, not the sensor; tribin::sim has the sensor.
-inline Scan posed_scan(const std::vector<std::pair<const Mesh*, Pose>>& things, const Vec3& table_normal, double table_rho,
-                       double sigma_mm, double correlation_px, unsigned seed, int width = 640, int height = 512) {
+/// A scan of meshes at known poses above a table (a plane n . p = rho, n towards the camera), with correlated noise. No
+/// shadow, no drop-out: what is measured is the method, not the sensor; tribin::sim has the sensor.
+inline Scan posed_scan(const std::vector<std::pair<const Mesh*, Pose>>& things, const Vec3& table_normal,
+                       double table_rho, double sigma_mm, double correlation_px, unsigned seed, int width = 640,
+                       int height = 512) {
   Scan scan;
   scan.camera = {width, height, 1.4 * width, 1.4 * width, 0.5 * (width - 1), 0.5 * (height - 1)};
   scan.z_mm = Image<float>(width, height, std::numeric_limits<float>::quiet_NaN());

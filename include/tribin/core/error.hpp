@@ -29,9 +29,9 @@ class Error : public std::runtime_error {
 }  // namespace tribin
 
 /// A broken contract inside tribin: checked in every build.
-#define TRIBIN_ASSERT(condition)                                                                              \
-  do {                                                                                                        \
-    if (!(condition)) ::tribin::assertion_failed(#condition, __FILE__, __LINE__);                             \
+#define TRIBIN_ASSERT(condition)                                                  \
+  do {                                                                            \
+    if (!(condition)) ::tribin::assertion_failed(#condition, __FILE__, __LINE__); \
   } while (false)
 
 namespace tribin {

@@ -18,15 +18,15 @@ struct Warning {
 struct FinderOptions {
   SurfelOptions surfel;
   SegmentationOptions segmentation;
-  double tolerance_mm = 0;    ///< 0 = none asked for
+  double tolerance_mm = 0;  ///< 0 = none asked for
   double tolerance_rad = 0;
-  int time_limit_ms = 0;      ///< 0 = none
+  int time_limit_ms = 0;  ///< 0 = none
 };
 
 /// Everything that one look at a scan gave: the instances, and what led to them.
 struct Found {
-  std::string status;         ///< ok | empty | not_empty_no_object | no_data | time_limit
-  Surfels surfels;            ///< refers to the scan
+  std::string status;  ///< ok | empty | not_empty_no_object | no_data | time_limit
+  Surfels surfels;     ///< refers to the scan
   Primitives primitives;
   PrimitiveModel observation;
   Instances instances;
@@ -34,8 +34,8 @@ struct Found {
   StageTimes times;
 };
 
-/// The perception chain: scan -> surfels -> primitives -> model -> instances. The scan and the parts must outlive the answer.
-/// \throws Error too_little_data | out_of_range (a part that cannot be in this scan: a unit mistaken, mostly).
+/// The perception chain: scan -> surfels -> primitives -> model -> instances. The scan and the parts must outlive the
+/// answer. \throws Error too_little_data | out_of_range (a part that cannot be in this scan: a unit mistaken, mostly).
 Found find_parts(const Scan& scan, std::span<const Part> parts, const FinderOptions& options = {});
 
 }  // namespace tribin

@@ -17,25 +17,25 @@ struct ContinuousSymmetry {
 
 /// The rigid motions that leave the part as it is (part_from_part).
 struct SymmetryGroup {
-  std::vector<Pose> discrete;                   ///< with the identity first
-  std::vector<ContinuousSymmetry> continuous;   ///< none or one; three for a ball
+  std::vector<Pose> discrete;                  ///< with the identity first
+  std::vector<ContinuousSymmetry> continuous;  ///< none or one; three for a ball
 };
 
 /// A pose that leaves most of the surface in place, and what tells it from the true one.
 struct SelfSimilarPose {
   Pose part_from_part = Pose::Identity();
-  double overlap = 0;                           ///< share of the surface that stays in place
-  std::vector<Vec3f> discriminating_points;     ///< on the part, where the two differ
+  double overlap = 0;                        ///< share of the surface that stays in place
+  std::vector<Vec3f> discriminating_points;  ///< on the part, where the two differ
 };
 
 /// What a camera sees of the part from one direction.
 struct PartView {
-  Vec3 direction = Vec3::UnitZ();   ///< unit, from the part towards the camera, part frame
-  std::vector<Vec3f> points;        ///< visible surface points, part frame; any prefix covers the view evenly
-  std::vector<Vec3f> normals;       ///< their facets' normals
-  double area_mm2 = 0;              ///< projected
-  /// Where the seen points begin and end (1 % and 99 % quantiles) along kViewAngles directions across the view: direction k
-  /// lies k * 360 / kViewAngles degrees from u of orthonormal_basis(direction), towards v.
+  Vec3 direction = Vec3::UnitZ();  ///< unit, from the part towards the camera, part frame
+  std::vector<Vec3f> points;       ///< visible surface points, part frame; any prefix covers the view evenly
+  std::vector<Vec3f> normals;      ///< their facets' normals
+  double area_mm2 = 0;             ///< projected
+  /// Where the seen points begin and end (1 % and 99 % quantiles) along kViewAngles directions across the view:
+  /// direction k lies k * 360 / kViewAngles degrees from u of orthonormal_basis(direction), towards v.
   std::vector<Vec2> extents;
 };
 
@@ -51,12 +51,13 @@ struct Part {
   std::vector<std::int32_t> primitive_of_triangle;  ///< primitive id, 0 = none
   Vec3 box_min = Vec3::Zero();
   Vec3 box_max = Vec3::Zero();
-  double diameter_mm = 0;           ///< largest distance between two vertices
+  double diameter_mm = 0;  ///< largest distance between two vertices
   double area_mm2 = 0;
-  double gyration_mm = 0;           ///< rms distance of the surface from the box centre: turns radians into mm
+  double gyration_mm = 0;  ///< rms distance of the surface from the box centre: turns radians into mm
   SymmetryGroup symmetry;
   std::vector<SelfSimilarPose> self_similar;
-  std::vector<ContinuousSymmetry> nearly_round;  ///< axes about which turns leave most of the part in place: spins are searched
+  std::vector<ContinuousSymmetry>
+      nearly_round;  ///< axes about which turns leave most of the part in place: spins are searched
   std::vector<PartView> views;
   std::vector<std::string> warnings;
 
@@ -67,7 +68,7 @@ struct Part {
 const PartView& nearest_view(const Part& part, const Vec3& direction);
 
 struct PartOptions {
-  std::string name;   ///< empty = the mesh's name
+  std::string name;  ///< empty = the mesh's name
 };
 
 /// Compiles a CAD mesh into a part: primitives by the one segmentation, symmetries, views.

@@ -5,8 +5,8 @@
 
 namespace tribin {
 
-/// Normal equations of the outline: how far the scan's depth edges lie from the part's occluding edges, in true units (pixels
-/// of the image against the sd of an edge).
+/// Normal equations of the outline: how far the scan's depth edges lie from the part's occluding edges, in true units
+/// (pixels of the image against the sd of an edge).
 struct ContourSums {
   Matrix6 information = Matrix6::Zero();  ///< of (dt in mm, w in rad about the centre), camera axes
   Vector6 pull = Vector6::Zero();         ///< right-hand side: information * step = pull
@@ -17,7 +17,8 @@ struct ContourSums {
 /// \param render     of the part at this pose; its step sets the spacing of the samples.
 /// \param center     in the camera frame; rotations turn about it.
 /// \param reach_px   how far from the outline an edge is looked for.
-/// \source ours. Edges of the mesh between a facet that looks at the camera and one that does not, where nothing of the part lies
+/// \source ours. Edges of the mesh between a facet that looks at the camera and one that does not, where nothing of the
+/// part lies
 ///         beyond; facets seen at more than 65 deg are left out, because grazing drop-out eats their rim.
 ContourSums contour_sums(const RenderMesh& mesh, const SceneDepth& scene, const Pose& camera_from_part,
                          const IndexRender& render, const Vec3& center, double reach_px);

@@ -18,11 +18,11 @@ struct OutlineEdge {
 
 /// A mesh laid out for rendering: facet planes beside the triangles, float coordinates.
 struct RenderMesh {
-  std::vector<Vec3f> vertices;                           ///< part frame, mm
+  std::vector<Vec3f> vertices;  ///< part frame, mm
   std::vector<std::array<std::uint32_t, 3>> triangles;
-  std::vector<Vec3f> normals;                            ///< unit, outward, one a triangle
-  std::vector<OutlineEdge> edges;                           ///< those that can be an outline: not between coplanar triangles
-  bool two_sided = false;                                ///< the mesh has no known orientation
+  std::vector<Vec3f> normals;      ///< unit, outward, one a triangle
+  std::vector<OutlineEdge> edges;  ///< those that can be an outline: not between coplanar triangles
+  bool two_sided = false;          ///< the mesh has no known orientation
   Vec3 box_min = Vec3::Zero();
   Vec3 box_max = Vec3::Zero();
 };

@@ -9,16 +9,17 @@ namespace tribin {
 
 /// What the depth image says about points of a part at a pose. The three states of a point, and no data.
 struct LookUp {
-  int supported = 0;  ///< the scan is where the point is, and its normal agrees
-  int unsure = 0;     ///< the scan is where the point is, but has no normal there: an edge or a hole nearby
-  int background = 0; ///< the scan is where the point is, but belongs to the background: neither for nor against
-  int violated = 0;   ///< the scan lies behind: the camera sees through the part
-  int occluded = 0;   ///< the scan lies in front: nothing is known
-  int no_data = 0;    ///< no measurement there, or outside of the image
+  int supported = 0;   ///< the scan is where the point is, and its normal agrees
+  int unsure = 0;      ///< the scan is where the point is, but has no normal there: an edge or a hole nearby
+  int background = 0;  ///< the scan is where the point is, but belongs to the background: neither for nor against
+  int violated = 0;    ///< the scan lies behind: the camera sees through the part
+  int occluded = 0;    ///< the scan lies in front: nothing is known
+  int no_data = 0;     ///< no measurement there, or outside of the image
   int total = 0;
 
-  /// In (-inf, 1]: 1 when all is supported. A see-through point costs three supported ones; an occluded or unmeasured one
-  /// little, since nothing speaks against it. \source ours; weights as the log-odds of algorithm notes section 8, rounded.
+  /// In (-inf, 1]: 1 when all is supported. A see-through point costs three supported ones; an occluded or unmeasured
+  /// one little, since nothing speaks against it. \source ours; weights as the log-odds of algorithm notes section 8,
+  /// rounded.
   double score() const {
     return total == 0 ? -1.0 : (supported + 0.5 * unsure - 3.0 * violated - 0.3 * occluded - 0.1 * no_data) / total;
   }
@@ -37,7 +38,8 @@ LookUp look_up_early(const SceneDepth& scene, const Pose& camera_from_part, std:
                      double hopeless);
 
 /// Moves a pose along its line of sight so that the median point lies on the scan: for poses whose depth is a guess.
-Pose settle_depth(const SceneDepth& scene, const Pose& camera_from_part, std::span<const Vec3f> points, std::size_t count);
+Pose settle_depth(const SceneDepth& scene, const Pose& camera_from_part, std::span<const Vec3f> points,
+                  std::size_t count);
 
 struct PointRefineOptions {
   int iterations = 8;

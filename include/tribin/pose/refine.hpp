@@ -23,16 +23,17 @@ struct Refinement {
   Pose camera_from_part = Pose::Identity();
   /// Of (dt in mm, w in rad about the centre), camera axes: pixels (noise correlation and step counted) and outlines.
   Matrix6 information = Matrix6::Zero();
-  int weak_by_surface = 0;                ///< directions that the outlines hold better than the surface
-  int pixels = 0;                         ///< that hold the pose
-  double rms_mm = 0;                      ///< of their residuals along the surface normal
-  double rms_sigma = 0;                   ///< the same in units of the local sigma
+  int weak_by_surface = 0;  ///< directions that the outlines hold better than the surface
+  int pixels = 0;           ///< that hold the pose
+  double rms_mm = 0;        ///< of their residuals along the surface normal
+  double rms_sigma = 0;     ///< the same in units of the local sigma
 };
 
 /// Moves a pose so that the CAD surface meets the scan: projective association by an index render, point-to-plane
 /// residuals against the facet that each pixel sees, Geman-McClure weights with a falling scale.
 /// \cost one render and about 15 ns a pixel per iteration.
 /// \source ours; robust graduated kernel after Zhou, Park, Koltun, "Fast Global Registration", 2016.
-Refinement refine_pose(const RenderMesh& mesh, const SceneDepth& scene, const Pose& start, const RefineOptions& options);
+Refinement refine_pose(const RenderMesh& mesh, const SceneDepth& scene, const Pose& start,
+                       const RefineOptions& options);
 
 }  // namespace tribin

@@ -9,11 +9,12 @@ namespace tribin {
 /// A scan prepared for verification and refinement: depth, its local noise, normals of cells, and where depth breaks.
 struct SceneDepth {
   PinholeCamera camera;
-  Image<float> z_mm;              ///< NaN = no measurement
-  Image<std::uint8_t> near_break; ///< 1 where a depth break or the border of a hole lies within one pixel: mixed pixels
-  Image<Vec3f> cell_normal;       ///< towards the camera; zero where the cell has no surfel
-  /// 1 where a cell belongs to a surface that is too large for the part looked for (a table, a wall): a face of the part that
-  /// lies in it is seen nowhere. Empty = none.
+  Image<float> z_mm;  ///< NaN = no measurement
+  Image<std::uint8_t>
+      near_break;            ///< 1 where a depth break or the border of a hole lies within one pixel: mixed pixels
+  Image<Vec3f> cell_normal;  ///< towards the camera; zero where the cell has no surfel
+  /// 1 where a cell belongs to a surface that is too large for the part looked for (a table, a wall): a face of the
+  /// part that lies in it is seen nowhere. Empty = none.
   Image<std::uint8_t> background;
   int cell_px = 1;
   const Surfels* surfels = nullptr;

@@ -6,19 +6,20 @@
 namespace tribin {
 
 struct VerificationOptions {
-  int step_px = 1;             ///< rendered pixels
-  double tolerance_mm = 0;     ///< a pixel within this of the surface is supported even if the noise is smaller (coarse poses)
-  double cad_sigma_mm = 0;     ///< how far the part may be from its CAD
-  double diameter_mm = 1;      ///< of the part: the scale of "near" and "far" behind
+  int step_px = 1;  ///< rendered pixels
+  double tolerance_mm =
+      0;  ///< a pixel within this of the surface is supported even if the noise is smaller (coarse poses)
+  double cad_sigma_mm = 0;  ///< how far the part may be from its CAD
+  double diameter_mm = 1;   ///< of the part: the scale of "near" and "far" behind
 };
 
 /// What each pixel of a rendered pose says, and what the outline says.
 struct Verification {
-  int pixels = 0;          ///< of the silhouette inside the image
-  int supported = 0;       ///< the scan is at the surface, within 5 sigma
-  int misfit = 0;          ///< the scan is near the surface, but not at it
-  int violated = 0;        ///< the scan is far behind: the camera sees through the part
-  int occluded = 0;        ///< something lies in front
+  int pixels = 0;     ///< of the silhouette inside the image
+  int supported = 0;  ///< the scan is at the surface, within 5 sigma
+  int misfit = 0;     ///< the scan is near the surface, but not at it
+  int violated = 0;   ///< the scan is far behind: the camera sees through the part
+  int occluded = 0;   ///< something lies in front
   int no_data = 0;
   double gain = 0;         ///< summed evidence in pixels of the full image: at most one a pixel
   int outline = 0;         ///< supported outline pixels
@@ -37,7 +38,8 @@ struct Verification {
 };
 
 /// Renders the part at a pose and compares every pixel and the outline with the scan.
-/// \source three states and contour evidence: ours (docs/recognition.md). Faces that lie in a floor or a wall are supported
+/// \source three states and contour evidence: ours (docs/recognition.md). Faces that lie in a floor or a wall are
+/// supported
 ///         by it and never seen through; only the outline, beyond which the floor goes on, gives them away.
 Verification verify_pose(const RenderMesh& mesh, const SceneDepth& scene, const Pose& camera_from_part,
                          const VerificationOptions& options);

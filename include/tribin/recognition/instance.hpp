@@ -13,25 +13,25 @@ namespace tribin {
 struct WeakDirection {
   Vector6 direction = Vector6::Zero();  ///< unit, (mm, rad * lever) as in Instance::covariance
   double sigma_mm = 0;
-  double sigma = 0;                     ///< [rad]
-  std::string cure;                     ///< what would fix it
+  double sigma = 0;  ///< [rad]
+  std::string cure;  ///< what would fix it
 };
 
 /// A self-similar pose that the data does not settle.
 struct Alternative {
   Pose camera_from_part = Pose::Identity();
   double probability = 0;
-  std::string decided_by;               ///< the feature that would tell
+  std::string decided_by;  ///< the feature that would tell
 };
 
 /// One primitive of the part, measured in the scan without its nominal value.
 struct Evidence {
-  std::string primitive;                ///< e.g. "cylinder 3": type and id of the part's primitive
+  std::string primitive;  ///< e.g. "cylinder 3": type and id of the part's primitive
   PrimitiveType type = PrimitiveType::plane;
-  int cad_primitive = 0;                ///< id in the part's model
-  int scan_primitive = 0;               ///< id in the scan's segmentation; 0 = measured without one
-  double visible_arc = 0;               ///< [rad] cylinders, cones
-  int inliers = 0;                      ///< pixels
+  int cad_primitive = 0;   ///< id in the part's model
+  int scan_primitive = 0;  ///< id in the scan's segmentation; 0 = measured without one
+  double visible_arc = 0;  ///< [rad] cylinders, cones
+  int inliers = 0;         ///< pixels
   double rms_mm = 0;
   std::optional<double> radius_nominal_mm, radius_measured_mm, radius_sigma_mm;
   std::optional<double> offset_mm, offset_sigma_mm;  ///< planes: measured minus nominal place along the normal
@@ -39,13 +39,14 @@ struct Evidence {
 
 /// A part found in the scan.
 struct Instance {
-  int id = 0;                           ///< from 1, best first
+  int id = 0;  ///< from 1, best first
   std::string part;
-  double score = 0;                     ///< probability that class and place are right
-  double visible_fraction = 0;          ///< share of its silhouette that the camera sees
+  double score = 0;             ///< probability that class and place are right
+  double visible_fraction = 0;  ///< share of its silhouette that the camera sees
   std::optional<double> p_within_tolerance;
   Pose camera_from_part = Pose::Identity();
-  Matrix6 covariance = Matrix6::Zero(); ///< order (dt in mm, w in rad): R_true = Exp(w) R, t_true = t + dt, camera axes
+  Matrix6 covariance =
+      Matrix6::Zero();  ///< order (dt in mm, w in rad): R_true = Exp(w) R, t_true = t + dt, camera axes
   std::vector<Vector6> free_directions;
   std::vector<WeakDirection> weak_directions;
   std::vector<Pose> equivalent_poses;

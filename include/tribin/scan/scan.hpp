@@ -21,14 +21,14 @@ struct NoiseProfile {
 
 /// An organized depth scan: z along the optical axis of an ideal pinhole. x and y are never stored.
 struct Scan {
-  Image<float> z_mm;               ///< H x W, NaN = no measurement
+  Image<float> z_mm;  ///< H x W, NaN = no measurement
   PinholeCamera camera;
   NoiseProfile noise;
   Image<std::uint8_t> modulation;  ///< H x W grey levels of fringe modulation; empty if not known
   Image<std::uint8_t> invalid_reason;
-  Image<Vec3f> rays;               ///< only where the grid is no pinhole: ray with z = 1 of each pixel; else empty
+  Image<Vec3f> rays;  ///< only where the grid is no pinhole: ray with z = 1 of each pixel; else empty
   Pose input_from_camera = Pose::Identity();  ///< the file's own frame; results are given in it
-  std::string source;              ///< file name, for messages
+  std::string source;                         ///< file name, for messages
   std::vector<std::string> warnings;
 
   int width() const { return z_mm.width; }
@@ -44,8 +44,8 @@ std::size_t valid_count(const Scan& scan);
 
 /// Loose points, without a grid.
 struct PointSet {
-  std::vector<Vec3f> points;     ///< mm, in the file's frame; no NaN
-  std::optional<Vec3> viewpoint; ///< where the camera stood; none = normals stay unsigned
+  std::vector<Vec3f> points;      ///< mm, in the file's frame; no NaN
+  std::optional<Vec3> viewpoint;  ///< where the camera stood; none = normals stay unsigned
   std::string source;
   std::vector<std::string> warnings;
 };

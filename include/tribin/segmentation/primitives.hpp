@@ -17,36 +17,38 @@ const char* name_of(PrimitiveType type);
 struct BoundaryCircle {
   Vec3 center = Vec3::Zero();  ///< mm
   double radius_mm = 0;
-  double rms_mm = 0;           ///< of the boundary points about the circle
-  double arc = 0;              ///< [rad] covered by points
+  double rms_mm = 0;  ///< of the boundary points about the circle
+  double arc = 0;     ///< [rad] covered by points
 };
 
 /// A closed boundary of a plane's support: the outer rim or a hole.
 struct BoundaryLoop {
   bool inner = false;
-  std::vector<Vec3f> points;            ///< mm, sub-pixel places on the depth edge, in order
-  std::optional<BoundaryCircle> circle; ///< where a circle explains it
+  std::vector<Vec3f> points;             ///< mm, sub-pixel places on the depth edge, in order
+  std::optional<BoundaryCircle> circle;  ///< where a circle explains it
 };
 
-/// One surface primitive. The covariance's parameters are (tilt about u, tilt about v [rad], shift along u, shift along v,
-/// radius [mm], half angle [rad]) with u, v of orthonormal_basis(axis); a plane has (tilt, tilt, offset along the axis in
-/// place 2); a sphere has its centre in places 0-2 and its radius in 4. Unused rows are 0.
+/// One surface primitive. The covariance's parameters are (tilt about u, tilt about v [rad], shift along u, shift along
+/// v, radius [mm], half angle [rad]) with u, v of orthonormal_basis(axis); a plane has (tilt, tilt, offset along the
+/// axis in place 2); a sphere has its centre in places 0-2 and its radius in 4. Unused rows are 0.
 struct Primitive {
-  int id = 0;                       ///< from 1, the place in Primitives
+  int id = 0;  ///< from 1, the place in Primitives
   PrimitiveType type = PrimitiveType::plane;
-  Vec3 axis = Vec3::UnitZ();        ///< unit. Plane: normal towards the camera / outward. Cylinder: z >= 0. Cone: from the apex into the cone
-  Vec3 point = Vec3::Zero();        ///< mm. Plane: centre of the support. Cylinder: on the axis at mid-height. Cone: apex. Sphere: centre
-  double offset_mm = 0;             ///< plane: dot(axis, x) = offset
-  double radius_mm = 0;             ///< cylinder, sphere
-  double half_angle = 0;            ///< cone [rad]
-  double extent_min = 0;            ///< cylinder, cone: first place of the support along the axis, from `point` [mm]
-  double extent_max = 0;            ///< last place
-  double arc = 0;                   ///< [rad] visible arc about the axis
-  bool concave = false;             ///< seen from inside: a hole, a bore, a dish
-  bool radius_from_cad = false;     ///< the radius was held at a nominal value (short arcs)
+  Vec3 axis = Vec3::UnitZ();     ///< unit. Plane: normal towards the camera / outward. Cylinder: z >= 0. Cone: from the
+                                 ///< apex into the cone
+  Vec3 point = Vec3::Zero();     ///< mm. Plane: centre of the support. Cylinder: on the axis at mid-height. Cone: apex.
+                                 ///< Sphere: centre
+  double offset_mm = 0;          ///< plane: dot(axis, x) = offset
+  double radius_mm = 0;          ///< cylinder, sphere
+  double half_angle = 0;         ///< cone [rad]
+  double extent_min = 0;         ///< cylinder, cone: first place of the support along the axis, from `point` [mm]
+  double extent_max = 0;         ///< last place
+  double arc = 0;                ///< [rad] visible arc about the axis
+  bool concave = false;          ///< seen from inside: a hole, a bore, a dish
+  bool radius_from_cad = false;  ///< the radius was held at a nominal value (short arcs)
   double area_mm2 = 0;
-  double rms_mm = 0;                ///< of the raw points (CAD: vertices) about the surface
-  int points = 0;                   ///< raw points in the support
+  double rms_mm = 0;  ///< of the raw points (CAD: vertices) about the surface
+  int points = 0;     ///< raw points in the support
   Matrix6 covariance = Matrix6::Zero();
   std::vector<std::uint32_t> surfels;
   std::vector<BoundaryLoop> loops;  ///< plane only
@@ -80,9 +82,9 @@ struct Primitives {
 };
 
 struct SegmentationOptions {
-  std::vector<double> radii_mm;   ///< radii to expect (from the CAD); empty = free radii only
-  double min_area_mm2 = 0;        ///< smallest support; 0 = 30 cells' worth
-  bool boundaries = true;         ///< scan: trace the rims and holes of planes
+  std::vector<double> radii_mm;  ///< radii to expect (from the CAD); empty = free radii only
+  double min_area_mm2 = 0;       ///< smallest support; 0 = 30 cells' worth
+  bool boundaries = true;        ///< scan: trace the rims and holes of planes
 };
 
 /// Finds planes, cylinders, cones and spheres by going back and forth between IJK space, parameter space and 3-D space

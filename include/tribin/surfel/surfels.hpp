@@ -15,17 +15,17 @@ enum class SurfelShape : std::uint8_t { unknown, flat, ruled, curved };
 /// Small pieces of surface: the ONE input of segmentation, whether they come from a scan, loose points or a CAD file.
 /// Structure of arrays; entry i of each vector belongs to surfel i.
 struct Surfels {
-  std::vector<Vec3f> position;         ///< mm; camera frame (scan), file frame (points), part frame (CAD)
-  std::vector<Vec3f> normal;           ///< unit; towards the camera (scan), outward (CAD): on the whole sphere
-  std::vector<float> curvature1;       ///< [1/mm] principal, |curvature1| >= |curvature2|; > 0 convex (ball from outside)
-  std::vector<float> curvature2;       ///< [1/mm]
-  std::vector<Vec3f> direction2;       ///< unit; direction of curvature2: the ruling of a cylinder or cone
+  std::vector<Vec3f> position;    ///< mm; camera frame (scan), file frame (points), part frame (CAD)
+  std::vector<Vec3f> normal;      ///< unit; towards the camera (scan), outward (CAD): on the whole sphere
+  std::vector<float> curvature1;  ///< [1/mm] principal, |curvature1| >= |curvature2|; > 0 convex (ball from outside)
+  std::vector<float> curvature2;  ///< [1/mm]
+  std::vector<Vec3f> direction2;  ///< unit; direction of curvature2: the ruling of a cylinder or cone
   std::vector<float> sigma_curvature;  ///< [1/mm] sd of curvature1
   std::vector<float> sigma_normal;     ///< [rad] sd per tangent axis
   std::vector<float> sigma_mm;         ///< sd of the position along the normal
   std::vector<float> area_mm2;         ///< on the surface: the weight in all votes
   std::vector<SurfelShape> shape;
-  std::vector<std::uint32_t> points;   ///< number of raw points (scan, points) or 1 (CAD)
+  std::vector<std::uint32_t> points;  ///< number of raw points (scan, points) or 1 (CAD)
 
   std::vector<std::uint32_t> neighbour_begin;  ///< CSR: neighbours of i are neighbours[neighbour_begin[i] .. [i+1])
   std::vector<std::uint32_t> neighbours;       ///< 8 of the cell grid, mesh edges, or nearest points
@@ -35,19 +35,19 @@ struct Surfels {
   const PointSet* point_set = nullptr;
   const Mesh* mesh = nullptr;
 
-  int cell_px = 0;                        ///< scan: side of a cell [px]
-  Image<std::int32_t> surfel_of_cell;     ///< scan: grid of cells, -1 = none
-  std::vector<std::uint32_t> cell;        ///< scan: row-major index of the surfel's cell
-  Image<float> local_sigma_mm;            ///< scan: the estimated local noise of z, one value per tile of 8 x 8 cells
-  double correlation_px = 0;              ///< scan: used noise correlation
-  float max_radius_mm = 100;              ///< the radius that `flat` was proven against
+  int cell_px = 0;                     ///< scan: side of a cell [px]
+  Image<std::int32_t> surfel_of_cell;  ///< scan: grid of cells, -1 = none
+  std::vector<std::uint32_t> cell;     ///< scan: row-major index of the surfel's cell
+  Image<float> local_sigma_mm;         ///< scan: the estimated local noise of z, one value per tile of 8 x 8 cells
+  double correlation_px = 0;           ///< scan: used noise correlation
+  float max_radius_mm = 100;           ///< the radius that `flat` was proven against
 
   std::size_t size() const { return position.size(); }
 };
 
 struct SurfelOptions {
-  int cell_px = 0;              ///< [px] 2..16; 0 = 4, or more where the noise hides the curvature of max_radius_mm
-  float max_radius_mm = 100;    ///< largest radius that must be told from a plane; sets what "flat" must prove
+  int cell_px = 0;            ///< [px] 2..16; 0 = 4, or more where the noise hides the curvature of max_radius_mm
+  float max_radius_mm = 100;  ///< largest radius that must be told from a plane; sets what "flat" must prove
 };
 
 /// Cuts a scan into cells and fits each a plane in inverse depth, then a quadric over windows of cells.
