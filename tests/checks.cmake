@@ -4,7 +4,8 @@ find_program(TRIBIN_CLANG_FORMAT NAMES clang-format clang-format-14)
 
 function(tribin_check name)
   add_test(NAME ${name} COMMAND ${ARGN} WORKING_DIRECTORY ${PROJECT_SOURCE_DIR})
-  set_tests_properties(${name} PROPERTIES LABELS quick SKIP_RETURN_CODE 77)
+  set_tests_properties(${name} PROPERTIES LABELS quick SKIP_RETURN_CODE 77
+    ENVIRONMENT "XDG_CACHE_HOME=${PROJECT_BINARY_DIR}/cache")  # the user's own cache is left alone
 endfunction()
 
 if(TRIBIN_PYTHON)

@@ -46,8 +46,12 @@ struct PartArgument {
 /// \throws Error bad_option for two equal names.
 std::vector<PartArgument> part_arguments(const std::vector<std::string>& arguments);
 
-/// Reads and compiles the parts; their warnings go to the log.
-std::vector<Part> read_parts(const std::vector<PartArgument>& arguments, const std::string& unit);
+/// --no-cache, for commands that compile parts.
+void add_no_cache(CLI::App* command, bool& no_cache);
+
+/// Reads the parts and compiles those that the cache does not hold; their warnings go to the log.
+std::vector<Part> read_parts(const std::vector<PartArgument>& arguments, const std::string& unit,
+                             bool no_cache = false);
 
 /// Reads an organized scan and logs its warnings.
 Scan read_scan_logged(const std::filesystem::path& scan, const std::string& camera, const std::string& unit);

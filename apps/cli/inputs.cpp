@@ -3,7 +3,7 @@
 #include "commands.hpp"
 #include "tribin/core/error.hpp"
 #include "tribin/core/log.hpp"
-#include "tribin/io/cad_files.hpp"
+#include "tribin/io/part_cache.hpp"
 
 namespace tribin::cli {
 
@@ -49,11 +49,18 @@ std::vector<PartArgument> part_arguments(const std::vector<std::string>& argumen
   return out;
 }
 
-std::vector<Part> read_parts(const std::vector<PartArgument>& arguments, const std::string& unit) {
+void add_no_cache(CLI::App* command, bool& no_cache) {
+  command->add_flag("--no-cache", no_cache, "Compile the CAD anew: no kept part is used, and none is kept");
+}
+
+std::vector<Part> read_parts(const std::vector<PartArgument>& arguments, const std::string& unit, bool no_cache) {
+  PartReadOptions options;
+  options.cad.unit = length_unit_from_name(unit);
+  if (!no_cache) options.cache = part_cache_folder();
   std::vector<Part> parts;
   for (const PartArgument& argument : arguments) {
-    const Mesh mesh = read_cad(argument.file, {.unit = length_unit_from_name(unit)});
-    parts.push_back(compile_part(mesh, {.name = argument.name}));
+    options.name = argument.name;
+    parts.push_back(read_part(argument.file, options));
     for (const std::string& warning : parts.back().warnings)
       log(LogLevel::warning, argument.file.filename().string() + ": " + warning);
   }

@@ -20,7 +20,7 @@ struct Options {
   std::vector<std::string> parts;
   double tolerance_mm = 0, tolerance_deg = 0;
   int time_limit_ms = 0;
-  bool no_times = false;
+  bool no_times = false, no_cache = false;
   FinderOptions finder;
 };
 
@@ -97,7 +97,7 @@ int run(Options options, const Context& context) {
     const StageTimer timer(reading, "read");
     scan = read_scan_logged(options.scan, options.camera, options.scan_unit);
   }
-  const std::vector<Part> parts = read_parts(arguments, options.unit);
+  const std::vector<Part> parts = read_parts(arguments, options.unit, options.no_cache);
   std::optional<ReportTruth> truth;
   if (!options.truth.empty()) truth = read_truth(options);
 
@@ -156,6 +156,7 @@ void add_locate(CLI::App& app, Context& context) {
   command->add_option("--truth", options->truth, "scene_gt.json of a simulated scan: adds the errors")
       ->type_name("FILE");
   command->add_flag("--no-times", options->no_times, "Leave the times out: same input, same bytes");
+  add_no_cache(command, options->no_cache);
   only_experts(command->add_option("--cell-px", options->finder.surfel.cell_px), context);
   only_experts(command->add_option("--max-radius-mm", options->finder.surfel.max_radius_mm), context);
   only_experts(command->add_option("--min-area-mm2", options->finder.segmentation.min_area_mm2), context);

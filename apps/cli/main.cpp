@@ -9,7 +9,6 @@
 #include "tribin/core/error.hpp"
 #include "tribin/core/log.hpp"
 #include "tribin/core/parallel.hpp"
-#include "tribin/io/cad_files.hpp"
 #ifdef TRIBIN_WITH_CAD_EXCHANGE
 #include "tribin/cad_exchange/read_step.hpp"
 #endif
@@ -34,12 +33,7 @@ void log_to_stderr(const Context& context) {
 
 void register_optional_readers() {
 #ifdef TRIBIN_WITH_CAD_EXCHANGE
-  using Path = std::filesystem::path;
-  using Options = tribin::CadReadOptions;
-  for (const char* extension : {".step", ".stp"})
-    tribin::register_cad_reader(extension, [](const Path& p, const Options&) { return tribin::read_step(p.string()); });
-  for (const char* extension : {".iges", ".igs"})
-    tribin::register_cad_reader(extension, [](const Path& p, const Options&) { return tribin::read_iges(p.string()); });
+  tribin::register_cad_exchange();
 #endif
 }
 

@@ -4,7 +4,7 @@
 #include "output.hpp"
 #include "tribin/core/log.hpp"
 #include "tribin/core/stage_times.hpp"
-#include "tribin/io/cad_files.hpp"
+#include "tribin/io/part_cache.hpp"
 #include "tribin/report/json.hpp"
 #include "tribin/report/report.hpp"
 
@@ -13,7 +13,7 @@ namespace {
 
 struct Options {
   std::string cad, unit = "mm", json, report;
-  bool no_times = false;
+  bool no_times = false, no_cache = false;
 };
 
 void print_table(const Part& part) {
@@ -36,16 +36,10 @@ void print_table(const Part& part) {
 
 int run(const Options& options, const Context& context) {
   StageTimes times;
-  Mesh mesh;
-  {
-    const StageTimer timer(times, "read");
-    mesh = read_cad(options.cad, {.unit = length_unit_from_name(options.unit)});
-  }
-  Part part;
-  {
-    const StageTimer timer(times, "compile");
-    part = compile_part(mesh);
-  }
+  PartReadOptions reading;
+  reading.cad.unit = length_unit_from_name(options.unit);
+  if (!options.no_cache) reading.cache = part_cache_folder();
+  const Part part = read_part(options.cad, reading, &times);
   for (const std::string& warning : part.warnings)
     log(LogLevel::warning, std::filesystem::path(options.cad).filename().string() + ": " + warning);
   const std::string file = std::filesystem::path(options.cad).filename().string();
@@ -72,6 +66,7 @@ void add_part(CLI::App& app, Context& context) {
   command->add_option("--json", options->json, "Write the result as JSON; - is stdout")->type_name("OUT|-");
   command->add_option("--report", options->report, "Write a page with pictures and tables")->type_name("DIR");
   command->add_flag("--no-times", options->no_times, "Leave the times out: same input, same bytes");
+  add_no_cache(command, options->no_cache);
   command->callback([options, &context] { context.run = [options, &context] { return run(*options, context); }; });
 }
 

@@ -29,6 +29,9 @@ class DxfGroups {
   std::int64_t whole(const DxfGroup& group) const;
   [[noreturn]] void fail(const DxfGroup& group, std::string_view seen, std::string_view wanted) const;
 
+  /// Faces that smoothing may still make, all MESHes of the file together: a level takes four times as many.
+  std::size_t smooth_faces_left = 1'000'000;
+
  private:
   const FileBytes& file_;
   std::size_t at_ = 0;
@@ -58,13 +61,17 @@ struct DxfBlock {
   DxfFacets facets;
   std::vector<DxfInsert> inserts;
   std::map<std::string, std::size_t> ignored;  ///< entities that are no surface or not supported, by type
-  std::size_t smooth = 0;                      ///< meshes whose smoothed form was asked for; their cage is read
+  std::size_t too_smooth = 0;                  ///< MESHes with more levels of smoothing than were read
 };
 
 /// Reads the entities of a block or of the model, up to ENDBLK or ENDSEC.
 ///
 /// 3DFACE; POLYLINE as polyface (negative numbers mark invisible edges only) and as polymesh m x n, open or closed;
-/// MESH; INSERT with scale, rotation, extrusion, rows and columns. Entities on paper space are left out.
+/// MESH with its levels of smoothing; INSERT with scale, rotation, extrusion, rows and columns. Entities on paper space
+/// are left out.
 DxfBlock read_dxf_entities(DxfGroups& groups, std::string_view end);
+
+/// Adds a MESH entity to a block: its cage, smoothed as often as the entity says.
+void add_dxf_mesh(DxfGroups& groups, const DxfEntity& entity, DxfBlock& block);
 
 }  // namespace tribin::io

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <optional>
 
@@ -96,7 +97,8 @@ void add_polymesh(const DxfGroups& groups, const DxfEntity& polyline, const std:
                   DxfBlock& block) {
   const std::int64_t flags = whole_or(groups, polyline, 70, 0);
   std::int64_t m = whole_or(groups, polyline, 71, 0), n = whole_or(groups, polyline, 72, 0);
-  const bool smooth = flags & 4;  // the smoothed points are in the file, beside the control points (flag 16)
+  // A smooth surface comes with its points in the file (flag 8), beside the control points (flag 16).
+  const bool smooth = std::any_of(vertices.begin(), vertices.end(), [](const DxfVertex& v) { return v.flags & 8; });
   if (smooth) m = whole_or(groups, polyline, 73, m), n = whole_or(groups, polyline, 74, n);
   std::vector<Vec3> grid;
   for (const DxfVertex& v : vertices) {
@@ -119,52 +121,6 @@ void add_polymesh(const DxfGroups& groups, const DxfEntity& polyline, const std:
       block.facets.triangles.push_back({at(i, j), at(i + 1, j), at(i + 1, j + 1)});
       block.facets.triangles.push_back({at(i, j), at(i + 1, j + 1), at(i, j + 1)});
     }
-  }
-}
-
-void add_mesh(const DxfGroups& groups, const DxfEntity& entity, DxfBlock& block) {
-  std::vector<Vec3> points;
-  std::vector<std::int64_t> list;
-  std::int64_t list_size = -1;
-  bool in_points = false;
-  std::int64_t point_count = 0;
-  bool own = false;  // groups of AcDbEntity come first, among them a 92 of another meaning (proxy graphics)
-  for (const DxfGroup& g : entity) {
-    own |= g.code == 100 && g.value == "AcDbSubDMesh";
-    if (!own) continue;
-    if (g.code == 91 && groups.whole(g) > 0 && list_size < 0) ++block.smooth;
-    if (g.code == 92 && !in_points) in_points = true, point_count = groups.whole(g);
-    if (g.code == 93 && list_size < 0) list_size = groups.whole(g);
-    if (in_points && list_size < 0) {
-      if (g.code == 10) points.push_back(Vec3(groups.number(g), 0, 0));
-      if (g.code == 20 && !points.empty()) points.back().y() = groups.number(g);
-      if (g.code == 30 && !points.empty()) points.back().z() = groups.number(g);
-    }
-    if (g.code == 94) break;  // edges and creases: nothing for a surface
-    if (g.code == 90 && list_size >= 0) list.push_back(groups.whole(g));
-  }
-  if (point_count != static_cast<std::int64_t>(points.size()) || list_size != static_cast<std::int64_t>(list.size())) {
-    groups.fail(
-        entity[0],
-        "a MESH with " + std::to_string(points.size()) + " vertices and a face list of " + std::to_string(list.size()),
-        std::to_string(point_count) + " (group 92) and " + std::to_string(list_size) + " (group 93)");
-  }
-  for (std::size_t i = 0; i < list.size();) {
-    const std::int64_t size = list[i++];
-    if (size < 0 || size > static_cast<std::int64_t>(list.size() - i)) {
-      groups.fail(entity[0], "a face of " + std::to_string(size) + " corners in the face list",
-                  "3 or more, within the list");
-    }
-    std::vector<Vec3> corners;
-    for (std::int64_t k = 0; k < size; ++k) {
-      const std::int64_t index = list[i++];
-      if (index < 0 || index >= static_cast<std::int64_t>(points.size())) {
-        groups.fail(entity[0], "vertex " + std::to_string(index) + " in a MESH",
-                    "0.." + std::to_string(points.size()) + " (not included)");
-      }
-      corners.push_back(points[static_cast<std::size_t>(index)]);
-    }
-    if (corners.size() >= 3) block.facets.add_polygon(corners);
   }
 }
 
@@ -213,7 +169,7 @@ DxfBlock read_dxf_entities(DxfGroups& groups, std::string_view end) {
     if (type == "3DFACE") {
       add_face(groups, entity, block);
     } else if (type == "MESH") {
-      add_mesh(groups, entity, block);
+      add_dxf_mesh(groups, entity, block);
     } else if (type == "INSERT") {
       add_insert(groups, entity, block);
     } else if (type == "POLYLINE") {

@@ -125,7 +125,7 @@ class Layout {
       mesh.triangles.push_back({first + t[0], first + t[1], first + t[2]});
     }
     for (const auto& [type, number] : block.ignored) ignored_[type] += number;
-    smooth_ += block.smooth;
+    too_smooth_ += block.too_smooth;
     for (const DxfInsert& insert : block.inserts) {
       const DxfBlock* inner = find(insert.block);
       if (!inner) {
@@ -148,7 +148,7 @@ class Layout {
 
   const std::map<std::string, std::size_t>& ignored() const { return ignored_; }
   std::size_t missing() const { return missing_; }
-  std::size_t smooth() const { return smooth_; }
+  std::size_t too_smooth() const { return too_smooth_; }
 
  private:
   static constexpr std::size_t kOpen = static_cast<std::size_t>(-1);
@@ -163,7 +163,7 @@ class Layout {
   std::map<std::string, std::size_t> counts_;
   std::map<std::string, bool> seen_hollow_;
   std::map<std::string, std::size_t> ignored_;
-  std::size_t depth_ = 0, missing_ = 0, smooth_ = 0;
+  std::size_t depth_ = 0, missing_ = 0, too_smooth_ = 0;
 };
 
 /// Entities that carry a solid in ACIS' own format: without them the part would be incomplete, so they are refused.
@@ -220,8 +220,9 @@ Mesh parse_dxf(const FileBytes& file, bool& unit_known) {
   if (layout.missing())
     mesh.warnings.push_back(std::to_string(layout.missing()) +
                             " INSERTs of blocks that are not in the file were left out");
-  if (layout.smooth())
-    mesh.warnings.push_back(std::to_string(layout.smooth()) + " smoothed meshes were read as their cage");
+  if (layout.too_smooth())
+    mesh.warnings.push_back(std::to_string(layout.too_smooth()) +
+                            " MESHes were smoothed less often than the file says, for their size");
   return mesh;
 }
 

@@ -19,6 +19,7 @@ DxfGroups::DxfGroups(const FileBytes& file) : file_(file) {
   if (file.view().starts_with("AutoCAD Binary DXF")) {
     bad_file(file.name, "byte 0", "a binary DXF", "an ASCII DXF (save it as such)");
   }
+  if (file.view().starts_with("\xef\xbb\xbf")) at_ = 3;  // the mark of UTF-8, which some writers put
   if (file.view().starts_with("AC10")) bad_file(file.name, "byte 0", "a DWG file", "a DXF (save it as such)");
 }
 

@@ -62,6 +62,43 @@ ViewStrength strength_of(const Part& part, const PartView& view) {
   return out;
 }
 
+/// What fixes each degree of freedom: of the whole surface's information (point to plane, each patch weighted by how
+/// much of it the views see), the share that each primitive gives. The rest lies on free-form surface.
+Json degrees_of_freedom(const Part& part) {
+  const char* const names[6] = {"shift along x", "shift along y", "shift along z",
+                                "turn about x",  "turn about y",  "turn about z"};
+  const Mesh& mesh = part.mesh;
+  std::vector<Vector6> share(part.model.primitives.size() + 1, Vector6::Zero());  // place 0: no primitive
+  Vector6 all = Vector6::Zero();
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    const auto id = static_cast<std::size_t>(part.primitive_of_triangle[t]);
+    const auto& [a, b, c] = mesh.triangles[t];
+    const Vec3 p = mesh.vertices[a].cast<double>(), q = mesh.vertices[b].cast<double>(),
+               r = mesh.vertices[c].cast<double>(), cross = (q - p).cross(r - p);
+    if (!(cross.norm() > 0)) continue;
+    const Vec3 n = cross.normalized(), arm = (p + q + r) / 3 - part.box_center();
+    double weight = 0.5 * cross.norm();
+    if (id > 0) weight *= part.exposed_mm2[id - 1] / std::max(part.model.primitives[id - 1].area_mm2, 1e-9);
+    Vector6 j;
+    j << n, arm.cross(n);
+    share[id] += weight * j.cwiseAbs2();
+    all += weight * j.cwiseAbs2();
+  }
+  constexpr double kWorthNaming = 0.05;
+  Json out = Json::array();
+  for (int k = 0; k < 6; ++k) {
+    std::vector<std::pair<double, std::size_t>> by;
+    for (std::size_t id = 1; id < share.size(); ++id)
+      if (share[id][k] > kWorthNaming * all[k]) by.emplace_back(-share[id][k] / all[k], id);
+    std::sort(by.begin(), by.end());
+    Json fixed = Json::array();
+    for (const auto& [minus_share, id] : by)
+      fixed.push_back({{"primitive", id}, {"share", json::rounded(-minus_share, 3)}});
+    out.push_back({{"motion", names[k]}, {"fixed_by", fixed}});
+  }
+  return out;
+}
+
 Json findability_json(const Part& part) {
   std::vector<double> sigmas;
   Json weak = Json::array();
@@ -81,6 +118,7 @@ Json findability_json(const Part& part) {
     out["median_sigma_mm"] = json::significant(sigmas[sigmas.size() / 2]);
     out["worst_sigma_mm"] = json::significant(std::min(sigmas.back(), 1e6));
   }
+  out["degrees_of_freedom"] = degrees_of_freedom(part);
   out["weak_views"] = weak;
   return out;
 }

@@ -98,6 +98,19 @@ class PartCommand(unittest.TestCase):
         part = validated(self, "part", out.stdout)
         self.assertEqual([p["type"] for p in part["primitives"]], ["plane"] * 6)
 
+    def test_a_kept_part_gives_the_same_bytes(self):
+        cache = WORK / "cache"
+        shutil.rmtree(cache, ignore_errors=True)
+        environment = dict(os.environ, XDG_CACHE_HOME=str(cache))
+        arguments = ["part", ROOT / "examples/parts/alternator_b.stl", "--json", "-", "--no-times"]
+        without = run(*arguments, "--no-cache", env=environment)
+        self.assertFalse(cache.exists())
+        first, second = (run(*arguments, "-v", env=environment) for _ in range(2))
+        self.assertEqual(len(list((cache / "tribin/parts").iterdir())), 1)
+        self.assertIn(str(cache), second.stderr)
+        self.assertEqual(without.stdout, first.stdout)
+        self.assertEqual(without.stdout, second.stdout)
+
     def test_the_report_is_one_page_without_network(self):
         dir = WORK / "part_report"
         shutil.rmtree(dir, ignore_errors=True)
@@ -122,6 +135,10 @@ class LocateCommand(unittest.TestCase):
         self.assertEqual(one.stdout, two.stdout)
         result = validated(self, "locate", one.stdout)
         self.assertEqual([i["part"] for i in result["instances"]], ["alternator_a"])
+
+    def test_a_kept_part_is_found_as_one_that_is_compiled_now(self):
+        kept, compiled = run(*self.arguments, "--json", "-"), run(*self.arguments, "--json", "-", "--no-cache")
+        self.assertEqual(kept.stdout, compiled.stdout)
 
     def test_the_report_holds_ten_figures_a_found_part(self):
         dir = WORK / "locate_report"

@@ -116,6 +116,17 @@ for version in ('R2000', 'R2010'):
         data.vertices = low + high
         data.faces = [[i, (i+1)%n, n+(i+1)%n, n+i] for i in range(n)] + [list(range(n))[::-1], list(range(n, 2*n))]
     doc.saveas(f'{folder}/mesh_{version}.dxf')
+    doc = ezdxf.new(version); doc.header['$INSUNITS'] = 4; doc.encoding = 'cp932'
+    block = doc.blocks.new('\u90e8\u54c1')  # a name in the code page of the file, or in UTF-8
+    for at, level, crease in ((-10, 3, 0), (10, 3, -1), (30, 0, 0)):
+        mesh = block.add_mesh(dxfattribs={'subdivision_levels': level})
+        with mesh.edit_data() as data:
+            data.vertices = [(at + x, y, z) for z in (-1, 1) for y in (-1, 1) for x in (-1, 1)]
+            data.faces = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]]
+            if crease: data.edges = [[0,1],[1,3],[3,2],[2,0],[4,5],[5,7],[7,6],[6,4],[0,4],[1,5],[2,6],[3,7]]
+            if crease: data.edge_crease_values = [crease] * 12
+    doc.modelspace().add_blockref(block.name, (0, 0, 0))
+    doc.saveas(f'{folder}/smooth_{version}.dxf')
 doc = ezdxf.new('R2010'); doc.header['$INSUNITS'] = 4
 inner = doc.blocks.new('inner', base_point=(1, 2, 3)); faces(inner)
 outer = doc.blocks.new('Outer')
@@ -150,6 +161,13 @@ open(f'{folder}/box.txt', 'w').write(' '.join(map(str, low_corner + high_corner)
     EXPECT_NEAR(surface_area(read_cad(path("polymesh"))), (unit ? 645.16 : 1) * side, unit ? 10 : 0.01);
     if (unit) {
       EXPECT_NEAR(signed_volume(read_cad(path("mesh"))), 1e9 * cap * 30, 1e7);
+      const Mesh smooth = read_cad(path("smooth"));
+      EXPECT_EQ(smooth.triangles.size(), 2u * 2 * 6 * 64 + 12);
+      // Two cubes keep their edges and 8 mm^3 each. The limit of the third lies between balls of the radii at which its
+      // corners and its faces end: sqrt(3) / 2 and 272 / 324.
+      const double third = signed_volume(smooth) - 16;
+      EXPECT_GT(third, 4.0 / 3 * kPi * std::pow(272.0 / 324, 3));
+      EXPECT_LT(third, 4.0 / 3 * kPi * std::pow(std::sqrt(0.75), 3));
     }
   }
   const Box box = bounding_box(read_cad(folder.path() / "insert.dxf").vertices);
@@ -159,6 +177,26 @@ open(f'{folder}/box.txt', 'w').write(' '.join(map(str, low_corner + high_corner)
     truth >> value;
     EXPECT_NEAR(i < 3 ? box.min[i] : box.max[i - 3], value, 1e-3) << i;
   }
+}
+
+TEST(ReadDxf, ASmoothPolymeshIsItsFittedPoints) {
+  const test::TemporaryFolder folder;
+  const auto vertex = [](int flags, double x, double y, double z) {
+    return "0\nVERTEX\n8\n0\n10\n" + std::to_string(x) + "\n20\n" + std::to_string(y) + "\n30\n" + std::to_string(z) +
+           "\n70\n" + std::to_string(flags) + "\n";
+  };
+  const std::string head = "\xef\xbb\xbf  0\nSECTION\n2\nENTITIES\n", tail = "0\nSEQEND\n0\nENDSEC\n0\nEOF\n";
+  std::string control, fitted;
+  for (int i = 0; i < 4; ++i) control += vertex(64 + 16, 10 * (i / 2), 10 * (i % 2), 5);
+  for (int i = 0; i < 9; ++i) fitted += vertex(64 + 8, 4 * (i / 3), 4 * (i % 3), 0);
+  const std::string sizes = "71\n2\n72\n2\n73\n3\n74\n3\n75\n6\n";
+  EXPECT_NEAR(surface_area(read_cad(
+                  folder.write("a.dxf", head + "0\nPOLYLINE\n66\n1\n70\n20\n" + sizes + control + fitted + tail))),
+              64, 1e-6);
+  // Smoothing was asked for, but the writer left its points out: the control points are the surface.
+  EXPECT_NEAR(
+      surface_area(read_cad(folder.write("b.dxf", head + "0\nPOLYLINE\n66\n1\n70\n20\n" + sizes + control + tail))),
+      100, 1e-6);
 }
 
 TEST(Convert, GoesFromAnyToAny) {
