@@ -154,7 +154,8 @@ double scale_of(const Surface& s, const Sampled& data, double limit, std::vector
   return std::clamp(kMadToSigma * median_of(scratch), 1.0, std::max(1.0, limit));
 }
 
-/// How much less than white noise the cells' means average down (surfel stage: 4 pi c^2 against one cell's own share).
+}  // namespace
+
 double correlation_inflation(const Surfels& s) {
   if (s.scan == nullptr || s.correlation_px <= 0) return 1;
   const double n = s.cell_px, c2 = 4.0 * s.correlation_px * s.correlation_px;
@@ -164,8 +165,6 @@ double correlation_inflation(const Surfels& s) {
   const double mean_variance = sum * sum / (n * n * n * n);
   return std::max(1.0, kPi * c2 / (n * n) / mean_variance);
 }
-
-}  // namespace
 
 int raw_points(const Surfels& surfels, std::uint32_t i, Vec3 points[3]) {
   if (surfels.mesh == nullptr) {

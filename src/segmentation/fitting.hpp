@@ -69,6 +69,9 @@ Surface sphere_from_normals(const Surfels& surfels, std::span<const std::uint32_
 /// A cone from the circle that its normals draw on the unit sphere, and the apex that their planes share.
 Surface cone_from_normals(const Surfels& surfels, std::span<const std::uint32_t> support);
 
+/// How many times fewer the data of a scan are than its cells, for their noise is correlated: >= 1.
+double correlation_inflation(const Surfels& surfels);
+
 /// Robust size of residuals in sigmas: 1.4826 MAD about 0, at least 1, at most what one raw point scatters.
 double residual_scale(const Surfels& surfels, std::span<const std::uint32_t> support, const Surface& surface);
 

@@ -130,9 +130,12 @@ Primitives segment(const Surfels& surfels, const SegmentationOptions& options) {
     if (surfels.mesh == nullptr) {
       find_planes(scene, limits, PlaneVoters::flat_and_undecided, out.spaces, found);
       find_cones_and_spheres(scene, limits, found);
+      find_by_great_circles(scene, limits, out.spaces, found);
     }
     if (found.size() == before) break;
   }
+
+  if (surfels.mesh == nullptr) merge_pieces(scene, found);
 
   // Supports in order of their surfels, by one pass over the labels; then the largest first.
   for (FoundSurface& f : found) f.support.clear();

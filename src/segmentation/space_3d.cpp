@@ -6,24 +6,16 @@
 namespace tribin::segmentation_detail {
 namespace {
 
-constexpr double kRoundSlack = 4.0 * kDegree;  // the quadric's gradient on a tight radius, cubic terms
-constexpr double kShortArc = 60.0 * kDegree;   // below, a free radius means little: algorithms.md section 10
+constexpr double kShortArc = 60.0 * kDegree;  // below, a free radius means little: algorithms.md section 10
 // Share of the rim that goes on smoothly: cylinders of the development scans 0-0.28, patches of a plaster bust
 // 0.35-0.8.
 constexpr double kMaxSmoothRim = 0.30;
 constexpr double kSurfelsPerSigma = 28;  // pieces of the bust that end at edges: below 25; cylinders: above 28
-constexpr double kMaxRmsSigma = 3.5;     // rms of cell means in sigmas: right ones 1-1.5, compromises > 4
-
-struct RoundCandidate {
-  Fit fit;
-  Indices support;
-  bool from_cad = false;
-};
 
 /// Fit, grow, fit: from a component to all that lies on its surface.
-std::optional<RoundCandidate> settle(Scene& scene, const Indices& component, const Surface& start, FitOptions options,
-                                     const Limits& limits) {
-  RoundCandidate c;
+std::optional<FoundSurface> settle(Scene& scene, const Indices& component, const Surface& start, FitOptions options,
+                                   const Limits& limits) {
+  FoundSurface c;
   options.max_surfels = 600;  // the place first
   c.fit = fit_round(scene.surfels, component, start, options);
   options.start_mm = 0;
@@ -38,28 +30,24 @@ std::optional<RoundCandidate> settle(Scene& scene, const Indices& component, con
   return c;
 }
 
-/// The last fit runs on the raw pixels; the residuals of the cells stay what the tests judge.
-void polish(const Scene& scene, RoundCandidate& c) {
-  if (scene.surfels.scan == nullptr) return;
-  FitOptions options;
-  options.hold_radius = c.from_cad;
-  options.cone = c.fit.surface.type == PrimitiveType::cone;
-  options.raw_pixels = true;
-  options.max_surfels = 3000;  // pixels: under correlated noise more of them say little more
-  const Fit fine = fit_round(scene.surfels, c.support, c.fit.surface, options);
-  if (!fine.valid || std::abs(fine.surface.radius - c.fit.surface.radius) > 0.1 * c.fit.surface.radius) return;
-  c.fit.surface = fine.surface;
-  c.fit.covariance = fine.covariance;
-}
-
-std::size_t kept(const Scene& scene, const Indices& component, const RoundCandidate& c) {
+std::size_t kept(const Scene& scene, const Indices& component, const FoundSurface& c) {
   std::size_t count = 0;
   for (std::uint32_t i : component) count += fits(scene.surfels, i, c.fit.surface, c.fit.scale, kRoundSlack);
   return count;
 }
 
+/// Share of the support that touches what is explained already.
+double flanked_share(const Scene& scene, const Indices& support) {
+  const Surfels& s = scene.surfels;
+  std::size_t count = 0;
+  for (std::uint32_t i : support)
+    count += std::any_of(s.neighbours.begin() + s.neighbour_begin[i], s.neighbours.begin() + s.neighbour_begin[i + 1],
+                         [&](std::uint32_t j) { return !scene.free(j); });
+  return static_cast<double>(count) / static_cast<double>(support.size());
+}
+
 /// Tests that every surface of revolution must pass before it explains anything.
-bool accepted(Scene& scene, const Indices& component, const RoundCandidate& c, double arc, const Limits& limits) {
+bool accepted(Scene& scene, const Indices& component, const FoundSurface& c, double arc, const Limits& limits) {
   const Surfels& s = scene.surfels;
   if (area_of(s, c.support) < limits.min_area_mm2) return false;
   if (c.fit.rms_sigma > kMaxRmsSigma) return false;
@@ -74,6 +62,9 @@ bool accepted(Scene& scene, const Indices& component, const RoundCandidate& c, d
   for (std::uint32_t i : c.support) sigma += s.sigma_mm[i];
   sigma *= c.fit.scale / static_cast<double>(c.support.size());
   if (arc < 15 * kDegree || sagitta < 6.0 * sigma) return false;
+  // Where two planes meet, the windows of the quadrics round the edge off: a strip of two or three cells along both.
+  if (s.mesh == nullptr && arc * c.fit.surface.radius < 4.0 * scene.cell_mm && flanked_share(scene, c.support) > 0.5)
+    return false;
   // A piece cut out of a free-form surface: goes on smoothly past its rim, or leaves waves inside.
   const double rim = smooth_rim_share(scene, c.support);
   const double waves = residual_correlation(scene, c.support, c.fit.surface);
@@ -84,6 +75,19 @@ bool accepted(Scene& scene, const Indices& component, const RoundCandidate& c, d
 }
 
 }  // namespace
+
+void polish(const Scene& scene, FoundSurface& c) {
+  if (scene.surfels.scan == nullptr) return;
+  FitOptions options;
+  options.hold_radius = c.radius_from_cad;
+  options.cone = c.fit.surface.type == PrimitiveType::cone;
+  options.raw_pixels = true;
+  options.max_surfels = 3000;  // pixels: under correlated noise more of them say little more
+  const Fit fine = fit_round(scene.surfels, c.support, c.fit.surface, options);
+  if (!fine.valid || std::abs(fine.surface.radius - c.fit.surface.radius) > 0.1 * c.fit.surface.radius) return;
+  c.fit.surface = fine.surface;
+  c.fit.covariance = fine.covariance;
+}
 
 double arc_of(const Surfels& s, const Indices& support, const Surface& surface) {
   Vec3 u, v;
@@ -114,7 +118,7 @@ std::optional<FoundSurface> explain_round(Scene& scene, const Indices& component
 
   FitOptions free;
   free.start_mm = std::min(2.5, 0.15 * rough.radius);  // a step of 3 mm must not be bridged by the kernel
-  std::optional<RoundCandidate> best = settle(scene, component, rough, free, limits);
+  std::optional<FoundSurface> best = settle(scene, component, rough, free, limits);
   std::size_t best_kept = best ? kept(scene, component, *best) : 0;
   const double best_radius = best ? best->fit.surface.radius : rough.radius;
   const double best_sigma = best ? std::sqrt(best->fit.covariance(4, 4)) : 0.2 * rough.radius;
@@ -132,13 +136,13 @@ std::optional<FoundSurface> explain_round(Scene& scene, const Indices& component
       start.radius = radius;
       FitOptions held = free;
       held.hold_radius = true;
-      std::optional<RoundCandidate> c = settle(scene, component, start, held, limits);
+      std::optional<FoundSurface> c = settle(scene, component, start, held, limits);
       if (!c) continue;
-      c->from_cad = true;
+      c->radius_from_cad = true;
       const std::size_t count = kept(scene, component, *c);
       // A nominal radius replaces the free one unless it loses surfels.
-      if (!best || count > best_kept || (!best->from_cad && count * 100 >= best_kept * 97) ||
-          (best->from_cad && count == best_kept && c->fit.rms_sigma < best->fit.rms_sigma)) {
+      if (!best || count > best_kept || (!best->radius_from_cad && count * 100 >= best_kept * 97) ||
+          (best->radius_from_cad && count == best_kept && c->fit.rms_sigma < best->fit.rms_sigma)) {
         best = std::move(c);
         best_kept = count;
       }
@@ -149,12 +153,12 @@ std::optional<FoundSurface> explain_round(Scene& scene, const Indices& component
   FitOptions taper;
   taper.cone = true;
   taper.max_surfels = 1500;
-  if (!best->from_cad) {
+  if (!best->radius_from_cad) {
     Fit cone = fit_round(s, best->support, best->fit.surface, taper);
     const double sigma = std::sqrt(cone.covariance(5, 5));
     if (cone.valid && std::abs(cone.surface.half_angle) > std::max(5.0 * sigma, 0.7 * kDegree) &&
         cone.rms_sigma < 0.8 * best->fit.rms_sigma) {
-      RoundCandidate c;
+      FoundSurface c;
       c.fit = cone;
       c.support = grow(scene, cone.surface, best->support, cone.scale, kRoundSlack);
       if (c.support.size() >= limits.min_surfels) {
@@ -166,12 +170,8 @@ std::optional<FoundSurface> explain_round(Scene& scene, const Indices& component
   const double arc = arc_of(s, best->support, best->fit.surface);
   if (!accepted(scene, component, *best, arc, limits)) return std::nullopt;
   polish(scene, *best);
-  FoundSurface out;
-  out.fit = best->fit;
-  out.support = std::move(best->support);
-  out.radius_from_cad = best->from_cad;
-  out.arc = arc;
-  return out;
+  best->arc = arc;
+  return best;
 }
 
 void find_cones_and_spheres(Scene& scene, const Limits& limits, std::vector<FoundSurface>& found) {
@@ -189,7 +189,7 @@ void find_cones_and_spheres(Scene& scene, const Limits& limits, std::vector<Foun
       FitOptions options;
       options.start_mm = std::min(2.5, 0.15 * start.radius);
       options.cone = !sphere;
-      std::optional<RoundCandidate> c = settle(scene, component, start, options, limits);
+      std::optional<FoundSurface> c = settle(scene, component, start, options, limits);
       if (!c) continue;
       if (std::abs(c->fit.surface.half_angle) > 80 * kDegree) continue;  // a dented plane
       const double arc = arc_of(s, c->support, c->fit.surface);
@@ -201,11 +201,8 @@ void find_cones_and_spheres(Scene& scene, const Limits& limits, std::vector<Foun
            std::sqrt(c->fit.covariance(4, 4)) > 0.1 * c->fit.surface.radius))
         continue;
       polish(scene, *c);
-      FoundSurface out;
-      out.fit = c->fit;
-      out.support = std::move(c->support);
-      out.arc = arc;
-      take(scene, found, std::move(out));
+      c->arc = arc;
+      take(scene, found, std::move(*c));
     }
   }
 }

@@ -17,6 +17,9 @@ struct FoundSurface {
   int peak = -1;
 };
 
+inline constexpr double kRoundSlack = 4.0 * kDegree;  // the quadric's gradient on a tight radius, cubic terms
+inline constexpr double kMaxRmsSigma = 3.5;           // rms of cell means in sigmas: right ones 1-1.5, compromises > 4
+
 /// Limits that all spaces share, derived once from the options and the surfels.
 struct Limits {
   std::vector<double> radii_mm;
@@ -36,6 +39,15 @@ void find_planes(Scene& scene, const Limits& limits, PlaneVoters voters, HoughSp
 /// Parameter space: peaks of rulings; in 3-D space centres and radii become cylinders, and cones where they taper.
 void find_cylinders(Scene& scene, const Limits& limits, HoughSpaces& spaces, std::vector<FoundSurface>& found);
 
+/// Parameter space by great circles: the normals of a component of what is left vote for all axes across them. Finds
+/// cylinders whose surfels bend too little, or are too few, for rulings of their own.
+void find_by_great_circles(Scene& scene, const Limits& limits, HoughSpaces& spaces, std::vector<FoundSurface>& found);
+
+/// Joins pieces of one cylinder or sphere that something hides or interrupts: parameters equal within their joint
+/// covariance (chi-square), a joint fit that explains both as well as two fits do, and, along the axis, nothing seen
+/// behind the surface in the gap. Planes stay apart: each is a face.
+void merge_pieces(Scene& scene, std::vector<FoundSurface>& found);
+
 /// What rulings do not explain: cones with wide angles and spheres, from components of curved surfels.
 void find_cones_and_spheres(Scene& scene, const Limits& limits, std::vector<FoundSurface>& found);
 
@@ -43,6 +55,10 @@ void find_cones_and_spheres(Scene& scene, const Limits& limits, std::vector<Foun
 /// truth.
 std::optional<FoundSurface> explain_round(Scene& scene, const Indices& component, const Vec3& axis,
                                           const Limits& limits);
+
+/// The last fit of a surface of revolution runs on the raw pixels of a scan, because the mean of a cell lies off a
+/// tight radius; the residuals of the cells stay what the tests judge.
+void polish(const Scene& scene, FoundSurface& surface);
 
 /// Arc of the support about the surface's axis [rad]: the circle less its largest gap.
 double arc_of(const Surfels& surfels, const Indices& support, const Surface& surface);
