@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <iostream>
 
@@ -7,6 +8,7 @@
 #include "progress.hpp"
 #include "tribin/core/error.hpp"
 #include "tribin/finder/finder.hpp"
+#include "tribin/paper_method/recognize.hpp"
 #ifdef TRIBIN_WITH_SIM
 #include "tribin/sim/paper_experiment.hpp"
 #endif
@@ -16,7 +18,7 @@ namespace {
 
 struct Options {
   std::vector<std::string> parts = {"examples/parts/alternator_a.step", "examples/parts/alternator_b.step"};
-  std::string json, unit = "mm";
+  std::string json, unit = "mm", method = "both";
   int poses = 40;
   int first = 1;
   double noise_mm = 0.1, noise_correlation_px = 1;
@@ -36,6 +38,46 @@ void set_bound(PaperRun& run, const sim::PaperScene& scene, const Part& part, do
   run.bound_rotation = std::sqrt(bound.bottomRightCorner<3, 3>().trace());
 }
 
+/// The test that stopped those candidates of a part which came furthest.
+std::string furthest_test(const std::vector<Reason>& rejected, const std::string& part) {
+  static const std::vector<std::string> kStages = {"matching", "key_cylinders", "key_planes", "pose"};
+  std::ptrdiff_t furthest = -1;
+  int most = 0;
+  std::string test;
+  for (const Reason& reason : rejected) {
+    if (reason.part != part) continue;
+    const std::ptrdiff_t stage = std::find(kStages.begin(), kStages.end(), reason.stage) - kStages.begin();
+    if (stage < furthest || (stage == furthest && reason.count <= most)) continue;
+    furthest = stage, most = reason.count, test = reason.test;
+  }
+  return test;
+}
+
+/// The paper's recognition and pose on the primitives that ours worked on.
+PaperMethodRun run_paper_method(const Found& found, const std::vector<Part>& parts,
+                                const std::vector<eval::Model>& models, const eval::Truth& truth) {
+  PaperMethodRun run;
+  StageTimes times;
+  Instances answers;
+  {
+    const StageTimer timer(times, "recognition_and_pose");
+    answers = paper::recognize(found.primitives, found.observation, found.surfels, parts);
+  }
+  run.ms = times.total();
+  if (answers.items.empty()) {
+    run.refused_by = furthest_test(answers.rejected, truth.part);
+    return run;
+  }
+  const Instance& best = answers.items.front();
+  run.answered = true;
+  run.class_right = best.part == truth.part;
+  run.found = !eval::judge(std::span(&best, 1), std::span(&truth, 1), models).found.empty();
+  for (const eval::Model& model : models)
+    if (run.class_right && model.name == truth.part)
+      run.error = eval::pose_error(model, best.camera_from_part, truth.camera_from_part);
+  return run;
+}
+
 PaperRun run_one(const std::vector<Part>& parts, const std::vector<eval::Model>& models, std::size_t which,
                  const std::vector<sim::StableRest>& rests, int seed, const Options& options) {
   const sim::PaperScene scene =
@@ -52,6 +94,7 @@ PaperRun run_one(const std::vector<Part>& parts, const std::vector<eval::Model>&
   run.found = !judged.found.empty();
   run.false_answers = static_cast<int>(judged.false_answers.size());
   if (run.found) run.error = judged.found.front().error;
+  if (options.method == "both") run.paper = run_paper_method(found, parts, models, truths.front());
   try {
     set_bound(run, scene, parts[which], options.noise_correlation_px);
   } catch (const Error&) {
@@ -74,7 +117,8 @@ int run(const Options& options, const Context& context) {
         progress.done(static_cast<int>(runs.size()));
         if (context.verbose)
           std::cerr << runs.back().part << " seed " << seed << (runs.back().found ? ": " : ": not found ")
-                    << runs.back().error.translation_mm << " mm, " << runs.back().error.rotation / kDegree << " deg\n";
+                    << runs.back().error.translation_mm << " mm, " << runs.back().error.rotation / kDegree << " deg"
+                    << paper_method_words(runs.back()) << "\n";
       }
     }
   }
@@ -107,6 +151,11 @@ void add_bench(CLI::App& app, Context& context) {
   command->add_option("--noise-correlation-px", options->noise_correlation_px, "Its correlation")
       ->check(CLI::Range(0.0, 5.0))
       ->type_name("X");
+  command
+      ->add_option("--method", options->method,
+                   "both: the paper's recognition and pose too, on the same primitives; surfel: ours alone")
+      ->check(CLI::IsMember({"both", "surfel"}))
+      ->type_name("M");
   command->add_option("--unit", options->unit, "Unit of CAD files that name none: mm, cm, m, inch")->type_name("U");
   command->add_option("--json", options->json, "Write every run as JSON; - is stdout")->type_name("OUT|-");
   command->add_flag("--no-times", options->no_times, "Leave the times out: same input, same bytes");

@@ -88,8 +88,7 @@ int exit_code(const Found& found) {
 }
 
 int run(Options options, const Context& context) {
-  if (options.method != "surfel")
-    throw Error(ErrorCode::bad_option, "--method " + options.method + ": not built yet; wanted surfel");
+  options.finder.method = options.method == "paper" ? Method::paper : Method::surfel;
   const std::vector<PartArgument> arguments = part_arguments(options.parts);
   StageTimes reading;
   Scan scan;
@@ -149,7 +148,11 @@ void add_locate(CLI::App& app, Context& context) {
       ->type_name("N");
   command->add_option("--unit", options->unit, "Unit of CAD files that name none: mm, cm, m, inch")->type_name("U");
   command->add_option("--scan-unit", options->scan_unit, "Unit of clouds: mm, m, auto")->type_name("U");
-  command->add_option("--method", options->method, "surfel")->type_name("M");
+  command
+      ->add_option("--method", options->method,
+                   "surfel, or paper: recognition and pose as Barajas et al. have them (docs/paper_method.md)")
+      ->check(CLI::IsMember({"surfel", "paper"}))
+      ->type_name("M");
   command->add_option("--json", options->json, "Write the result as JSON; - is stdout")->type_name("OUT|-");
   command->add_option("--report", options->report, "Write a page with pictures, evidence and reasons")
       ->type_name("DIR");

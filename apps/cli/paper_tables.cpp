@@ -85,27 +85,102 @@ std::string table1(const std::vector<PaperRun>& runs) {
   return out + line("  %-34s %11.1f %11.1f", "total, cloud to pose", eval::quantile(total, 0.5), kPaperTotalMs);
 }
 
+/// Means of the absolute errors along the axes, and of their norms.
+struct MeanErrors {
+  double mm[4] = {}, deg[4] = {};
+  std::size_t count = 0;
+};
+
+MeanErrors mean_errors(const std::vector<eval::PoseError>& errors) {
+  MeanErrors out;
+  out.count = errors.size();
+  const auto mean_of = [&](auto value) {
+    std::vector<double> all;
+    for (const eval::PoseError& e : errors) all.push_back(value(e));
+    return mean(all);
+  };
+  for (int k = 0; k < 3; ++k) {
+    out.mm[k] = mean_of([k](const eval::PoseError& e) { return std::abs(e.translation_axes_mm[k]); });
+    out.deg[k] = mean_of([k](const eval::PoseError& e) { return std::abs(e.rotation_axes[k]) / kDegree; });
+  }
+  out.mm[3] = mean_of([](const eval::PoseError& e) { return e.translation_mm; });
+  out.deg[3] = mean_of([](const eval::PoseError& e) { return e.rotation / kDegree; });
+  return out;
+}
+
+std::string error_line(const std::string& words, const MeanErrors& e, int decimals) {
+  std::string out = line("  %-40s", words.c_str());
+  out.pop_back();
+  for (const double* row : {e.mm, e.deg})
+    for (int k = 0; k < 4; ++k) {
+      char cell[32];
+      std::snprintf(cell, sizeof cell, k == 0 ? " %8.*f" : " %7.*f", decimals, row[k]);
+      out += cell;
+    }
+  return out + "\n";
+}
+
 std::string table2(const std::vector<PaperRun>& runs) {
-  std::string out =
-      line("Table II: mean absolute error        X mm    Y mm    Z mm    norm  Xth deg Yth deg Zth deg    norm");
+  std::string out = line("%-42s %8s %7s %7s %7s %8s %7s %7s %7s", "Table II: mean absolute error", "X mm", "Y mm",
+                         "Z mm", "norm", "Xth deg", "Yth deg", "Zth deg", "norm");
   const std::vector<std::string> parts = parts_of(runs);
   for (std::size_t i = 0; i < parts.size(); ++i) {
-    double mm[3], deg[3];
-    for (int k = 0; k < 3; ++k) {
-      mm[k] = mean(values(runs, parts[i], [k](const PaperRun& r) { return std::abs(r.error.translation_axes_mm[k]); }));
-      deg[k] =
-          mean(values(runs, parts[i], [k](const PaperRun& r) { return std::abs(r.error.rotation_axes[k]) / kDegree; }));
+    std::vector<eval::PoseError> ours, answered, near;
+    bool asked = false;
+    for (const PaperRun& run : runs) {
+      if (run.part != parts[i]) continue;
+      if (run.found) ours.push_back(run.error);
+      if (!run.paper) continue;
+      asked = true;
+      if (run.paper->class_right) answered.push_back(run.paper->error);
+      if (run.paper->found) near.push_back(run.paper->error);
     }
-    out += line("  %-24s tribin %7.4f %7.4f %7.4f %7.4f  %7.4f %7.4f %7.4f %7.4f", parts[i].c_str(), mm[0], mm[1],
-                mm[2], mean(values(runs, parts[i], translation)), deg[0], deg[1], deg[2],
-                mean(values(runs, parts[i], rotation_deg)));
     if (i < std::size(kTable2)) {
       const PaperErrors& p = kTable2[i];
-      out += line("  %-24s paper  %7.2f %7.2f %7.2f %7.2f  %7.2f %7.2f %7.2f %7.2f", p.name, p.mm[0], p.mm[1], p.mm[2],
-                  std::hypot(p.mm[0], p.mm[1], p.mm[2]), p.deg[0], p.deg[1], p.deg[2],
-                  std::hypot(p.deg[0], p.deg[1], p.deg[2]));
+      MeanErrors printed{{p.mm[0], p.mm[1], p.mm[2], std::hypot(p.mm[0], p.mm[1], p.mm[2])},
+                         {p.deg[0], p.deg[1], p.deg[2], std::hypot(p.deg[0], p.deg[1], p.deg[2])}};
+      out += error_line(p.name + std::string(", the paper's figures"), printed, 2);
     }
+    if (asked) {
+      out += error_line(parts[i] + ", its method, found " + std::to_string(near.size()), mean_errors(near), 2);
+      out += error_line(parts[i] + ", its method, right class " + std::to_string(answered.size()),
+                        mean_errors(answered), 2);
+    }
+    out += error_line(parts[i] + ", tribin, found " + std::to_string(ours.size()), mean_errors(ours), 4);
   }
+  return out;
+}
+
+/// How far the paper's method came, and where it stopped.
+std::string paper_method_summary(const std::vector<PaperRun>& runs) {
+  int count = 0, answered = 0, right = 0, found = 0;
+  std::vector<double> ms, mm, deg;
+  std::vector<std::pair<std::string, int>> refused;
+  for (const PaperRun& run : runs) {
+    if (!run.paper) continue;
+    ++count, answered += run.paper->answered, right += run.paper->class_right, found += run.paper->found;
+    ms.push_back(run.paper->ms);
+    if (run.paper->class_right)
+      mm.push_back(run.paper->error.translation_mm), deg.push_back(run.paper->error.rotation / kDegree);
+    if (run.paper->answered) continue;
+    const auto known = std::find_if(refused.begin(), refused.end(),
+                                    [&](const auto& entry) { return entry.first == run.paper->refused_by; });
+    if (known == refused.end())
+      refused.emplace_back(run.paper->refused_by, 1);
+    else
+      ++known->second;
+  }
+  if (count == 0) return {};
+  const eval::Share share = eval::share_of(right, count);
+  std::string out =
+      line("the paper's method: answered %d of %d, class right %d (95 %% interval %.3f to %.3f), found %d", answered,
+           count, right, share.low, share.high, found);
+  out += line("  right class: translation median %.2f mm, 95 %% %.2f mm; rotation median %.2f deg, 95 %% %.2f deg",
+              eval::quantile(mm, 0.5), eval::quantile(mm, 0.95), eval::quantile(deg, 0.5), eval::quantile(deg, 0.95));
+  out += line("  recognition and pose: median %.0f ms", eval::quantile(ms, 0.5));
+  for (const auto& [test, times] : refused)
+    out +=
+        line("  no answer in %d: the furthest candidates fell to %s", times, test.empty() ? "nothing" : test.c_str());
   return out;
 }
 
@@ -126,11 +201,22 @@ std::string paper_tables(const std::vector<PaperRun>& runs) {
   if (ratio_to_bound(runs, false) > 0)
     out += line("rms ratio to the Cramer-Rao bound of the very pixels: translation %.2f, rotation %.2f",
                 ratio_to_bound(runs, false), ratio_to_bound(runs, true));
+  out += paper_method_summary(runs);
   for (const PaperRun& run : runs)
     if (!run.found)
       out += line("  not found: %s, seed %d%s", run.part.c_str(), run.seed,
                   run.class_right ? " (right class, wrong pose)" : "");
   return out;
+}
+
+std::string paper_method_words(const PaperRun& run) {
+  if (!run.paper) return {};
+  if (!run.paper->answered) return "; paper: none, " + run.paper->refused_by;
+  if (!run.paper->class_right) return "; paper: wrong class";
+  std::string words = line("; paper: %.2f mm, %.2f deg%s", run.paper->error.translation_mm,
+                           run.paper->error.rotation / kDegree, run.paper->found ? "" : ", not found");
+  words.pop_back();
+  return words;
 }
 
 std::string paper_json(const std::vector<PaperRun>& runs, bool times) {
@@ -158,6 +244,17 @@ std::string paper_json(const std::vector<PaperRun>& runs, bool times) {
       entry["rotation_error_deg"] = {w.x(), w.y(), w.z()};
       entry["bound_mm"] = run.bound_translation_mm;
       entry["bound_deg"] = run.bound_rotation / kDegree;
+    }
+    if (run.paper) {
+      Json& paper = entry["paper_method"];
+      paper = {{"answered", run.paper->answered}, {"class_right", run.paper->class_right}, {"found", run.paper->found}};
+      if (run.paper->class_right) {
+        const Vec3 t = run.paper->error.translation_axes_mm, w = run.paper->error.rotation_axes / kDegree;
+        paper["translation_error_mm"] = {t.x(), t.y(), t.z()};
+        paper["rotation_error_deg"] = {w.x(), w.y(), w.z()};
+      }
+      if (!run.paper->answered) paper["refused_by"] = run.paper->refused_by;
+      if (times) paper["recognition_and_pose_ms"] = run.paper->ms;
     }
     if (times)
       for (const auto& [stage, ms] : run.times.stages_ms) entry["stages_ms"][stage] = ms;

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "tribin/core/error.hpp"
+#include "tribin/paper_method/recognize.hpp"
 #include "tribin/recognition/recognize.hpp"
 
 namespace tribin {
@@ -87,7 +88,9 @@ Found find_parts(const Scan& scan, std::span<const Part> parts, const FinderOpti
     // What the stages before took counts too.
     if (options.time_limit_ms > 0)
       recognition.time_limit_ms = std::max(1, options.time_limit_ms - static_cast<int>(found.times.total()));
-    found.instances = recognize(found.primitives, found.observation, found.surfels, parts, recognition);
+    found.instances = options.method == Method::paper
+                          ? paper::recognize(found.primitives, found.observation, found.surfels, parts)
+                          : recognize(found.primitives, found.observation, found.surfels, parts, recognition);
   }
   if (found.instances.time_limit)
     found.status = "time_limit";

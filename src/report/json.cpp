@@ -23,6 +23,11 @@ Json evidence_json(const Evidence& e) {
     out["offset_mm"] = {{"measured", json::millimetres(*e.offset_mm)}};
     if (e.offset_sigma_mm) out["offset_mm"]["sigma"] = json::significant(*e.offset_sigma_mm);
   }
+  for (const TestResult& test : e.tests)
+    out["tests"].push_back({{"test", test.test},
+                            {"value", json::significant(test.value)},
+                            {"limit", json::significant(test.limit)},
+                            {"passed", test.passed}});
   return out;
 }
 

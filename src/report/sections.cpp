@@ -113,6 +113,11 @@ std::string poses_section(const Scan& scan, std::span<const Part> parts, const F
 
 namespace {
 
+int digits_of(const TestResult& test) {
+  const double size = std::max(std::abs(test.value), std::abs(test.limit));
+  return size >= 100 ? 0 : size >= 1 ? 2 : 3;
+}
+
 /// One row; `beyond` counts those that differ by more than 3 sigma.
 std::string evidence_row(const Evidence& e, int& beyond) {
   std::string out =
@@ -129,8 +134,17 @@ std::string evidence_row(const Evidence& e, int& beyond) {
     out += cell(nominal ? number(*nominal, 2) : "–") + cell(measured ? number(*measured, 2) : "–") + cell("–") +
            "<td class=\"muted\">" + (nominal ? "held at CAD" : "") + "</td>";
   }
-  return out + cell(e.visible_arc > 0 ? number(e.visible_arc / kDegree, 0) + "°" : "–") + cell(number(e.rms_mm, 3)) +
+  out += cell(e.visible_arc > 0 ? number(e.visible_arc / kDegree, 0) + "°" : "–") + cell(number(e.rms_mm, 3)) +
          cell(grouped(e.inliers)) + "</tr>";
+  if (e.tests.empty()) return out;
+  out += "<tr><td class=\"wrap muted\" colspan=\"8\">";
+  for (const TestResult& test : e.tests) {
+    std::string words = test.test;
+    std::replace(words.begin(), words.end(), '_', ' ');
+    out += "<span class=\"test\">" + escaped(words) + " <b>" + number(test.value, digits_of(test)) + "</b> " +
+           (test.value <= test.limit ? "≤ " : "≥ ") + number(test.limit, digits_of(test)) + "</span>";
+  }
+  return out + "</td></tr>";
 }
 
 }  // namespace

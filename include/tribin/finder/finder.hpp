@@ -15,7 +15,11 @@ struct Warning {
   std::string text;
 };
 
+/// How parts are recognised from the primitives: ours (recognition), or as in sections IV-B and C (paper_method).
+enum class Method : std::uint8_t { surfel, paper };
+
 struct FinderOptions {
+  Method method = Method::surfel;
   SurfelOptions surfel;
   SegmentationOptions segmentation;
   double tolerance_mm = 0;  ///< 0 = none asked for

@@ -24,6 +24,14 @@ struct Alternative {
   std::string decided_by;  ///< the feature that would tell
 };
 
+/// A named test that a candidate was judged by: what was seen, what was wanted.
+struct TestResult {
+  std::string test;  ///< stable key, as in Reason::test
+  double value = 0;
+  double limit = 0;
+  bool passed = false;
+};
+
 /// One primitive of the part, measured in the scan without its nominal value.
 struct Evidence {
   std::string primitive;  ///< e.g. "cylinder 3": type and id of the part's primitive
@@ -35,6 +43,7 @@ struct Evidence {
   double rms_mm = 0;
   std::optional<double> radius_nominal_mm, radius_measured_mm, radius_sigma_mm;
   std::optional<double> offset_mm, offset_sigma_mm;  ///< planes: measured minus nominal place along the normal
+  std::vector<TestResult> tests;                     ///< where the method judges by named tests (paper_method)
 };
 
 /// A part found in the scan.
