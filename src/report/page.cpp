@@ -36,6 +36,7 @@ section>p{color:var(--text-2);max-width:84ch;margin-bottom:10px;font-size:13px;l
 table{border-collapse:collapse;width:100%}td,th{padding:7px 10px;font-size:13px;line-height:18px;text-align:left;border-bottom:1px solid var(--line);white-space:nowrap}
 th{font-weight:500;color:var(--text-3);font-size:12px}td.num,th.num{text-align:right}td.wrap{white-space:normal;min-width:22ch}tr:last-child td{border-bottom:0}
 .u,.muted{color:var(--text-3);font-weight:400}.test{display:inline-block;margin-right:14px;font-size:12px;line-height:17px}.test b{color:var(--text-2);font-weight:500}.t2{color:var(--text-2)}.bad-text{color:var(--bad);font-weight:600}
+details>summary{cursor:pointer;padding:6px 2px;font-size:13px;color:var(--text-2)}.two td,.two th{padding:6px 5px}.two td:first-child,.two th:first-child{padding-left:10px}.two td:last-child,.two th:last-child{padding-right:10px}.two .rail{width:78px}.two{align-items:start}
 .name{display:inline-flex;gap:8px;align-items:center;font-weight:600}
 .chip{display:inline-flex;align-items:center;gap:5px;height:24px;padding:0 10px;border-radius:12px;font-size:12px;white-space:nowrap}
 .chip.ok{background:var(--ok-soft);color:var(--ok)}.chip.warn{background:var(--warn-soft);color:var(--warn)}.chip.bad{background:var(--bad-soft);color:var(--bad)}

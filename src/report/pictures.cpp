@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "report/html.hpp"
+#include "report/patches.hpp"
 #include "report/shapes.hpp"
 #include "report/sighting.hpp"
 #include "report/spaces.hpp"
@@ -175,12 +176,8 @@ std::string scan_solids(const Observation& seen, const Sighting& where, const Vi
   }
   {
     Canvas canvas(view);
-    canvas.draw(surface_of(seen.scan, seen.surfels, where, stride, [&](int u, int v) {
-      const Primitive* p = on_part(where, u, v) ? labels.at(u, v) : nullptr;
-      if (!p) return out_of_sight;
-      PixelLook look = look_of_type(p);
-      look.onto = p;
-      return look;
+    canvas.draw(patches_of(seen.scan, where, [&](int u, int v) -> const Primitive* {
+      return on_part(where, u, v) ? labels.at(u, v) : nullptr;
     }));
     out += figure("g", "Model observed in the scan: the fitted surfaces, trimmed to what was seen",
                   painted(canvas, part_class, "Fitted primitives"));
@@ -256,6 +253,30 @@ std::string picture_legend() {
   return out + "</div>\n";
 }
 
+namespace {
+
+/// Leaves out the rows of a picture, above and below, where no part was found; a twelfth of its width stays around
+/// them.
+void keep_rows_with_parts(View& view, std::span<const Part> parts, const std::vector<Instance>& instances) {
+  double low = 1e300, high = -1e300;
+  for (const Instance& instance : instances)
+    for (const Part& part : parts) {
+      if (part.name != instance.part) continue;
+      for (const Vec3f& x : part.mesh.vertices) {
+        const double y = view.project(instance.camera_from_part * x.cast<double>()).y();
+        low = std::min(low, y), high = std::max(high, y);
+      }
+    }
+  if (low > high) return;
+  low = std::max(0.0, low - view.width / 12.0), high = std::min<double>(view.height, high + view.width / 12.0);
+  if (high - low < 80) return;
+  const Vec3 shift(0, (0.5 * (low + high) - 0.5 * view.height) / view.px_per_mm, 0);
+  view.center += view.view_from_world.transpose() * shift;
+  view.height = static_cast<int>(high - low);
+}
+
+}  // namespace
+
 std::string overview(const Observation& seen, std::span<const Part> parts, const std::vector<Instance>& instances) {
   constexpr int kWidth = 1060;
   const Scan& scan = seen.scan;
@@ -268,10 +289,19 @@ std::string overview(const Observation& seen, std::span<const Part> parts, const
   const int height = std::min(900, static_cast<int>(px_per_mm * z * scan.height() / scan.camera.fy));
   View view = view_along(Vec3::UnitZ(), Vec3::UnitY(), scan.camera.point(0.5 * scan.width(), 0.5 * scan.height(), z),
                          kWidth / px_per_mm, kWidth, height);
+  keep_rows_with_parts(view, parts, instances);
   Canvas canvas(view);
   const Sighting all = whole_scan(scan, seen.surfels, seen.primitives);
-  canvas.draw(
-      surface_of(scan, seen.surfels, all, std::max(1, scan.width() / 640), [](int, int) { return PixelLook{}; }));
+  Image<std::uint8_t> found(scan.width(), scan.height(), 0);
+  for (const Instance& instance : instances)
+    for (const Part& part : parts) {
+      if (part.name != instance.part) continue;
+      const Sighting on = sighting_of(scan, seen.surfels, seen.primitives, part, instance.camera_from_part);
+      for (std::size_t i = 0; i < found.size() && on.on_part.size() == found.size(); ++i)
+        found.data[i] |= on.on_part.data[i];
+    }
+  canvas.draw(surface_of(scan, seen.surfels, all, std::max(1, scan.width() / 640),
+                         [&](int u, int v) { return PixelLook{found(u, v) ? Material::grey : Material::faint}; }));
   const auto class_of = [&](const Instance& instance) {
     return static_cast<int>(
         std::find_if(parts.begin(), parts.end(), [&](const Part& p) { return p.name == instance.part; }) -
@@ -294,7 +324,7 @@ std::string overview(const Observation& seen, std::span<const Part> parts, const
   return "<figure class=\"wide\"><div class=\"art\">" +
          painted(canvas, -1, "The scan with the outline of every part found") +
          "</div><figcaption>The scan from the camera's eye, with the CAD outline of every part found in its class's "
-         "colour. Empty places were not measured.</figcaption></figure>\n";
+         "colour; what no part explains is pale, what was not measured is empty.</figcaption></figure>\n";
 }
 
 }  // namespace tribin::report

@@ -118,26 +118,35 @@ int digits_of(const TestResult& test) {
   return size >= 100 ? 0 : size >= 1 ? 2 : 3;
 }
 
-/// One row; `beyond` counts those that differ by more than 3 sigma.
-std::string evidence_row(const Evidence& e, int& beyond) {
+/// What differs from its nominal value by more than 3 sigma: how many, and the worst.
+struct Beyond {
+  int count = 0;
+  double sigmas = 0;
+  std::string primitive;
+  double by_mm = 0;
+  bool radius = false;
+};
+
+std::string evidence_row(const Evidence& e, Beyond& beyond) {
   std::string out =
-      "<tr><td>" + type_icon(e.type) + " " + escaped(e.primitive) + (e.radius_nominal_mm ? ", r" : "") + "</td>";
+      "<tr><td>" + type_icon(e.type) + " " + escaped(e.primitive) + (e.radius_nominal_mm ? ", r" : ", place") + "</td>";
   std::optional<double> nominal = e.radius_nominal_mm, measured = e.radius_measured_mm, sigma = e.radius_sigma_mm;
   if (!nominal && e.offset_mm) nominal = 0, measured = e.offset_mm, sigma = e.offset_sigma_mm;
   if (nominal && measured && sigma && *sigma > 0) {
     const int decimals = std::max(2, decimals_for(*sigma));
     const double off = (*measured - *nominal) / *sigma;
-    if (std::abs(off) > 3) ++beyond;
+    if (std::abs(off) > 3) ++beyond.count;
+    if (std::abs(off) > 3 && std::abs(off) > std::abs(beyond.sigmas))
+      beyond = {beyond.count, off, e.primitive, *measured - *nominal, static_cast<bool>(e.radius_nominal_mm)};
     out += cell(number(*nominal, 2)) + cell(number(*measured, decimals)) + cell(number(*sigma, decimals + 1)) + "<td>" +
            sigma_rail(off) + "</td>";
   } else {
     out += cell(nominal ? number(*nominal, 2) : "–") + cell(measured ? number(*measured, 2) : "–") + cell("–") +
            "<td class=\"muted\">" + (nominal ? "held at CAD" : "") + "</td>";
   }
-  out += cell(e.visible_arc > 0 ? number(e.visible_arc / kDegree, 0) + "°" : "–") + cell(number(e.rms_mm, 3)) +
-         cell(grouped(e.inliers)) + "</tr>";
+  out += cell(e.visible_arc > 0 ? number(e.visible_arc / kDegree, 0) + "°" : "–") + cell(number(e.rms_mm, 3)) + "</tr>";
   if (e.tests.empty()) return out;
-  out += "<tr><td class=\"wrap muted\" colspan=\"8\">";
+  out += "<tr><td class=\"wrap muted\" colspan=\"7\">";
   for (const TestResult& test : e.tests) {
     std::string words = test.test;
     std::replace(words.begin(), words.end(), '_', ' ');
@@ -154,21 +163,35 @@ std::string evidence_section(std::span<const Part> parts, const Found& found) {
       section("evidence", "Evidence",
               "Every primitive that was matched, measured without its nominal value; planes by their place along "
               "the normal. Ticks mark 3 σ.");
-  constexpr std::size_t kMost = 12;  // a page, not a data base: the JSON has them all
+  constexpr std::size_t kOpen = 10, kMost = 12;  // a page, not a data base: the JSON has them all
   std::string tables;
-  int beyond = 0, rows = 0;
+  int rows = 0;
+  Beyond beyond;
   for (std::size_t i = 0; i < found.instances.items.size() && i < kMost; ++i) {
     const Instance& instance = found.instances.items[i];
     tables += "<div><h3>" + class_tag(std::max(0, class_of(parts, instance.part))) + escaped(instance.part) + " " +
-              std::to_string(instance.id) + "</h3>" +
-              head({"Primitive" + unit("mm"), "Nominal", "Measured", "σ", "Difference", "Arc", "rms", "Pixels"}, 1);
-    for (const Evidence& e : instance.evidence) tables += evidence_row(e, beyond), ++rows;
-    tables += std::string(kTail) + "</div>";
+              std::to_string(instance.id) + "</h3>";
+    const std::vector<std::string> columns = {
+        "Primitive" + unit("mm"), "Nominal", "Measured", "σ", "Difference", "Arc", "rms"};
+    tables += head(columns, 1);
+    for (std::size_t k = 0; k < instance.evidence.size(); ++k) {
+      // The largest few are the proof; the rest is there for who asks.
+      if (k == kOpen && instance.evidence.size() > kOpen + 2)
+        tables += std::string(kTail) + "<details><summary>" + std::to_string(instance.evidence.size() - kOpen) +
+                  " smaller ones</summary>" + head(columns, 1);
+      tables += evidence_row(instance.evidence[k], beyond), ++rows;
+    }
+    tables += std::string(kTail) + (instance.evidence.size() > kOpen + 2 ? "</details>" : "") + "</div>";
   }
   if (found.instances.items.empty()) tables = "<p>There is none: no part is given out.</p>";
-  if (beyond > 0)
-    out +=
-        "<p>" + std::to_string(beyond) + " of " + std::to_string(rows) + " differ from the CAD by more than 3 σ.</p>";
+  if (beyond.count > 0)
+    out += "<p>" + std::to_string(beyond.count) + " of " + std::to_string(rows) +
+           " differ from the CAD by more than 3 σ; most of all " + escaped(beyond.primitive) + ", " +
+           number(std::abs(beyond.by_mm), 3) + " mm " +
+           (beyond.radius ? (beyond.by_mm > 0 ? "larger in radius" : "smaller in radius") : "off its place") + " (" +
+           number(std::abs(beyond.sigmas), 1) + " σ).</p>";
+  else if (rows > 0)
+    out += "<p>All " + std::to_string(rows) + " agree with the CAD within 3 σ.</p>";
   if (found.instances.items.size() > kMost)
     out += "<p>The best " + std::to_string(kMost) + " instances; report.json has all.</p>";
   return out + "<div class=\"two\">" + tables + "</div></section>\n";
@@ -179,13 +202,31 @@ namespace {
 /// The sentence of a test, by its stable key.
 std::string sentence_of(const Reason& r) {
   static const std::pair<const char*, const char*> kSentences[] = {
+      {"look_up", "Too few of its points would lie on the scan"},
+      {"probability", "It would be wrong more often than a robot may be"},
       {"free_space", "It would stand where the camera sees through"},
       {"support", "Too little of its surface is in the scan"},
       {"contour", "Its outline does not meet the scan's depth edges"},
       {"residual", "The scan does not lie on its surface"},
       {"radius_mm", "A radius does not fit"},
-      {"log_odds", "Another pose explains the same points better"},
+      {"log_likelihood", "Another pose explains the same points better"},
       {"overlap", "Another instance explains the same points"},
+      {"pixels", "Too few pixels would hold it"},
+      {"visible_fraction", "Too little of it would be visible"},
+      {"cylinder_radius", "A cylinder's radius is another one's"},
+      {"cylinder_height", "A cylinder's height is another one's"},
+      {"superquadric", "The points do not lie on the ideal cylinder"},
+      {"largest_cylinder", "It is not the part's largest cylinder"},
+      {"sub_cylinder", "The two cylinders are too far apart"},
+      {"cylinder_angle", "The two axes are not at the part's angle"},
+      {"cylinder_distance", "The two axes are not at the part's distance"},
+      {"plane_on_cylinder", "No plane meets the key cylinders"},
+      {"plane_to_cylinder", "A plane is not at the part's angle to the axis"},
+      {"plane_plane_angle", "Two planes are not at the part's angle"},
+      {"area_similarity", "A plane is too large or too small beside its cylinder"},
+      {"intersected_planes", "More planes meet the key cylinders than the part has"},
+      {"shared_planes", "More planes are shared by the key cylinders than the part has"},
+      {"icp_distance", "The model's points are too far from the scan's"},
       {"visible", "Too little of it would be visible"},
   };
   for (const auto& [test, sentence] : kSentences)

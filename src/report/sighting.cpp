@@ -5,8 +5,6 @@
 #include <functional>
 #include <limits>
 
-#include "report/shapes.hpp"
-
 namespace tribin::report {
 namespace {
 
@@ -136,14 +134,8 @@ ShadedSurface surface_of(const Scan& scan, const Surfels& surfels, const Sightin
       looks[k] = look(u, v);
       if (looks[k].material == Material::halo) continue;
       vertex[k] = static_cast<std::int64_t>(out.vertices.size());
-      if (looks[k].onto) {
-        const ShapePoint on = nearest_on(*looks[k].onto, grid.points[k].cast<double>());
-        out.vertices.push_back(on.point.cast<float>());
-        out.normals.push_back(on.normal.cast<float>());
-      } else {
-        out.vertices.push_back(grid.points[k]);
-        out.normals.push_back(normal_at(grid, surfels, u, v, i, j));
-      }
+      out.vertices.push_back(grid.points[k]);
+      out.normals.push_back(normal_at(grid, surfels, u, v, i, j));
     }
   const auto near = [&](std::size_t a, std::size_t b) {
     const float za = grid.points[a].z(), zb = grid.points[b].z();
@@ -151,7 +143,6 @@ ShadedSurface surface_of(const Scan& scan, const Surfels& surfels, const Sightin
   };
   const auto add = [&](std::size_t a, std::size_t b, std::size_t c) {
     if (vertex[a] < 0 || vertex[b] < 0 || vertex[c] < 0 || !near(a, b) || !near(b, c) || !near(a, c)) return;
-    if (looks[a].onto != looks[b].onto || looks[a].onto != looks[c].onto) return;  // a seam between two primitives
     out.triangles.push_back({static_cast<std::uint32_t>(vertex[a]), static_cast<std::uint32_t>(vertex[b]),
                              static_cast<std::uint32_t>(vertex[c])});
     out.materials.push_back(looks[a].material);

@@ -24,7 +24,6 @@ struct PixelLook {
   Material material = Material::grey;
   std::uint8_t step = 0;
   float tint = 0;
-  const Primitive* onto = nullptr;  ///< draw the pixel's point on this surface instead
 };
 
 /// The scan inside a rectangle as triangles, every `stride` pixels; holes stay holes, depth edges are not bridged.

@@ -135,8 +135,8 @@ std::string sphere_svg(const std::vector<float>& bins, const std::vector<PeakMar
     const double r = std::sqrt(std::max(0.0, 1 - c.d * c.d));
     const std::string d = path_of(120, [&](double t) {
       const Vec3 n = c.d * axis + r * (std::cos(t) * u + std::sin(t) * v);
-      Spot s = on_sphere(n);
-      if (n.z() < -0.01) s.z = -1;
+      Spot s = on_sphere(-n);  // normals that the camera sees point towards it: the half sphere shows their opposites
+      if (n.z() > 0.01) s.z = -1;
       return s;
     });
     out += "<path class=\"circle-halo\" d=\"" + d + "\"/><path class=\"circle " + c.type + "\" d=\"" + d + "\"/>";
@@ -147,7 +147,11 @@ std::string sphere_svg(const std::vector<float>& bins, const std::vector<PeakMar
   }
   const char* const names[] = {"i", "j", "k"};
   for (int axis = 0; axis < 3; ++axis) {
-    const Spot s = on_sphere(1.1 * Vec3::Unit(axis));
+    Spot s = on_sphere(1.1 * Vec3::Unit(axis));
+    for (const PeakMark& peak : peaks) {  // a ring's label goes first
+      const Spot ring_at = on_sphere(upward(peak.direction));
+      if (std::abs(ring_at.y - s.y) < 12 && s.x > ring_at.x - 12 && s.x < ring_at.x + 40) s.y = ring_at.y - 16;
+    }
     out += "<text class=\"axis a" + std::to_string(axis) + "\" text-anchor=\"middle\" " +
            text("x=\"%.1f\" y=\"%.1f\">", s.x, std::max(9.0, s.y + 4)) + names[axis] + "</text>";
   }
