@@ -46,7 +46,6 @@ struct FitOptions {
   bool cone = false;         ///< let the half angle go
   double start_mm = 0;       ///< robust scale to start at, 0 = already close
   int max_surfels = 4000;    ///< fit every k-th beyond that
-  bool raw_pixels = false;   ///< scan: fit the pixels behind the surfels; a cell's mean lies off a tight radius
 };
 
 /// Least squares of a plane to the surfels' positions, robust, weights 1 / sigma^2.
@@ -60,6 +59,12 @@ double curvature_bound(const Surfels& surfels, std::span<const std::uint32_t> su
 /// from `start_mm` to the noise. \param start  a surface near the solution.
 Fit fit_round(const Surfels& surfels, std::span<const std::uint32_t> support, const Surface& start,
               const FitOptions& options = {});
+
+/// The last steps of a fit on the raw pixels behind a scan's surfels, because a cell's mean lies off a tight radius.
+/// Moves fit.surface and renews its covariance; the residuals of the cells stay. \param label  of the surfels: pixels
+/// of free cells beside the support that lie on the surface are fitted as well. \return false where it cannot.
+bool refine_on_pixels(const Surfels& surfels, std::span<const std::uint32_t> support, const FitOptions& options,
+                      std::span<const std::int32_t> label, Fit& fit);
 
 /// The circle of revolution that normals across a known axis point at: centre and radius, closed form.
 /// \return a cylinder; radius <= 0 where the normals do not meet.

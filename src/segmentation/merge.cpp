@@ -34,11 +34,13 @@ Matrix7 axis_covariance(const Fit& fit, const Vec3& at) {
 /// Place of a surface's axis nearest to `at`.
 Vec3 on_axis(const Surface& s, const Vec3& at) { return s.point + s.axis * s.axis.dot(at - s.point); }
 
+constexpr double kMostWaves = 25;  // residuals of neighbours correlated by 0.67: beyond, the surface is another
+
 /// How many times the variance of a mean grows where neighbouring residuals are correlated by r, as those of a sensor's
 /// slow waves are: (1 + r) / (1 - r) along rows and along columns.
 double wave_inflation(Scene& scene, const FoundSurface& f) {
-  const double r = std::clamp(residual_correlation(scene, f.support, f.fit.surface), 0.0, 0.8);
-  return std::pow((1 + r) / (1 - r), 2);
+  const double r = std::max(0.0, residual_correlation(scene, f.support, f.fit.surface));
+  return std::min(std::pow((1 + r) / (1 - r), 2), kMostWaves);
 }
 
 /// Whether two cylinders' axes and radii are equal within their joint covariance, `waves` times what noise makes it.
@@ -176,6 +178,10 @@ void merge_pieces(Scene& scene, std::vector<FoundSurface>& found) {
       const bool sphere = p.type == PrimitiveType::sphere;
       if (!sphere && std::abs(p.axis.dot(q.axis)) < std::cos(kMaxTilt)) continue;
       if (std::abs(p.radius - q.radius) > 0.2 * std::max(p.radius, q.radius)) continue;
+      // Where even the slowest waves would not make them one, their waves need not be known.
+      if (!(sphere ? same_sphere(found[i].fit, found[j].fit, kMostWaves)
+                   : same_cylinder(found[i].fit, found[j].fit, kMostWaves)))
+        continue;
       const double waves = std::max(wave_inflation(scene, found[i]), wave_inflation(scene, found[j]));
       const bool same =
           sphere ? same_sphere(found[i].fit, found[j].fit, waves) : same_cylinder(found[i].fit, found[j].fit, waves);
@@ -186,7 +192,6 @@ void merge_pieces(Scene& scene, std::vector<FoundSurface>& found) {
       for (std::uint32_t k : one->support) scene.label[k] = 0;
       one->support = grow(scene, one->fit.surface, one->support, one->fit.scale, kRoundSlack);
       for (std::uint32_t k : one->support) scene.label[k] = static_cast<std::int32_t>(i + 1);
-      polish(scene, *one);
       one->arc = arc_of(scene.surfels, one->support, one->fit.surface);
       found[i] = std::move(*one);
       gone[j] = any = true;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tribin/core/parallel.hpp"
+
 namespace tribin::segmentation_detail {
 namespace {
 
@@ -85,10 +87,23 @@ Indices grow(Scene& scene, const Surface& surface, std::span<const std::uint32_t
   const Surfels& s = scene.surfels;
   const std::uint32_t seen = ++scene.tick;
   Indices support;
+  // A large region asks for most of the scene: all are tested ahead, in parallel.
+  constexpr std::size_t kLarge = 4096;
+  std::vector<std::uint8_t> on_surface;
+  if (seed.size() > kLarge) {
+    on_surface.resize(s.size());
+    parallel_ranges(static_cast<int>(s.size()), 4096, [&](int begin, int end) {
+      for (int i = begin; i < end; ++i) {
+        const auto k = static_cast<std::uint32_t>(i);
+        on_surface[k] = scene.free(k) && fits(s, k, surface, scale, slack);
+      }
+    });
+  }
   const auto consider = [&](std::uint32_t j) {
     if (scene.mark[j] == seen) return;
     scene.mark[j] = seen;
-    if (scene.free(j) && fits(s, j, surface, scale, slack)) support.push_back(j);
+    const bool good = on_surface.empty() ? scene.free(j) && fits(s, j, surface, scale, slack) : on_surface[j] != 0;
+    if (good) support.push_back(j);
   };
   for (std::uint32_t i : seed) consider(i);
   for (std::size_t at = 0; at < support.size(); ++at) around(s, support[at], consider, consider);

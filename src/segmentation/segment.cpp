@@ -130,12 +130,14 @@ Primitives segment(const Surfels& surfels, const SegmentationOptions& options) {
     if (surfels.mesh == nullptr) {
       find_planes(scene, limits, PlaneVoters::flat_and_undecided, out.spaces, found);
       find_cones_and_spheres(scene, limits, found);
-      find_by_great_circles(scene, limits, out.spaces, found);
     }
     if (found.size() == before) break;
   }
 
-  if (surfels.mesh == nullptr) merge_pieces(scene, found);
+  if (surfels.mesh == nullptr) {
+    find_by_great_circles(scene, limits, out.spaces, found);
+    merge_pieces(scene, found);
+  }
 
   // Supports in order of their surfels, by one pass over the labels; then the largest first.
   for (FoundSurface& f : found) f.support.clear();
@@ -143,7 +145,9 @@ Primitives segment(const Surfels& surfels, const SegmentationOptions& options) {
     if (scene.label[i] > 0) found[static_cast<std::size_t>(scene.label[i] - 1)].support.push_back(i);
   out.items.resize(found.size());
   parallel_each(static_cast<int>(found.size()), [&](int i) {
-    out.items[static_cast<std::size_t>(i)] = primitive_of(surfels, found[static_cast<std::size_t>(i)]);
+    FoundSurface& f = found[static_cast<std::size_t>(i)];
+    if (surfels.mesh == nullptr && f.fit.surface.type != PrimitiveType::plane) polish(scene, f);
+    out.items[static_cast<std::size_t>(i)] = primitive_of(surfels, f);
   });
   std::stable_sort(out.items.begin(), out.items.end(),
                    [](const Primitive& a, const Primitive& b) { return a.area_mm2 > b.area_mm2; });

@@ -12,28 +12,82 @@ constexpr double kShortArc = 60.0 * kDegree;  // below, a free radius means litt
 constexpr double kMaxSmoothRim = 0.30;
 constexpr double kSurfelsPerSigma = 28;  // pieces of the bust that end at edges: below 25; cylinders: above 28
 
-/// Fit, grow, fit: from a component to all that lies on its surface.
+std::size_t kept(const Scene& scene, const Indices& component, const FoundSurface& c) {
+  std::size_t count = 0;
+  for (std::uint32_t i : component) count += fits(scene.surfels, i, c.fit.surface, c.fit.scale, kRoundSlack);
+  return count;
+}
+
+/// Fit, grow, fit: from a component to all that lies on its surface. Few surfels find the place, more the shape.
 std::optional<FoundSurface> settle(Scene& scene, const Indices& component, const Surface& start, FitOptions options,
                                    const Limits& limits) {
   FoundSurface c;
-  options.max_surfels = 600;  // the place first
+  options.max_surfels = 200;
   c.fit = fit_round(scene.surfels, component, start, options);
+  if (!c.fit.valid || c.fit.surface.radius > limits.max_radius_mm) return std::nullopt;
+  // What is to be accepted keeps half of its component: one that keeps no third by now is not worth the rest.
+  if (3 * kept(scene, component, c) < component.size()) return std::nullopt;
   options.start_mm = 0;
-  for (int round = 0; round < 2; ++round) {
+  for (int most : {300, 800}) {
     if (!c.fit.valid || c.fit.surface.radius > limits.max_radius_mm) return std::nullopt;
     c.support = grow(scene, c.fit.surface, component, c.fit.scale, kRoundSlack);
     if (c.support.size() < limits.min_surfels) return std::nullopt;
-    options.max_surfels = round == 0 ? 600 : 1500;
+    options.max_surfels = most;
     c.fit = fit_round(scene.surfels, c.support, c.fit.surface, options);
   }
   if (!c.fit.valid) return std::nullopt;
   return c;
 }
 
-std::size_t kept(const Scene& scene, const Indices& component, const FoundSurface& c) {
-  std::size_t count = 0;
-  for (std::uint32_t i : component) count += fits(scene.surfels, i, c.fit.surface, c.fit.scale, kRoundSlack);
-  return count;
+/// Sum of squared residuals of a component in sigmas, each capped where a fit gives up on it.
+double capped_chi2(const Surfels& s, const Indices& component, const Surface& surface, double cap) {
+  double sum = 0;
+  for (std::uint32_t i : component) {
+    const double e = std::min(std::abs(misfit(s, i, surface)) / s.sigma_mm[i], cap);
+    sum += e * e;
+  }
+  return sum;
+}
+
+/// The nominal radius that explains the component best: each that the free fit leaves possible is tried on a sample,
+/// the best is fitted in full.
+std::optional<FoundSurface> explain_by_nominal(Scene& scene, const Indices& component, const FoundSurface* free_fit,
+                                               const Surface& rough, const Limits& limits) {
+  const Surfels& s = scene.surfels;
+  const Surface& near = free_fit ? free_fit->fit.surface : rough;
+  double reach = 0.2 * near.radius;
+  if (free_fit) {
+    // Where the free fit lies on the data like noise, its covariance says which radii are possible; else it may be a
+    // compromise.
+    const double sigmas = 5.0 * std::sqrt(free_fit->fit.covariance(4, 4));
+    const bool clean = free_fit->fit.rms_sigma < 1.5 && 10 * kept(scene, component, *free_fit) > 9 * component.size();
+    reach = clean ? sigmas + 0.02 * near.radius : std::max(sigmas, reach);
+  }
+  Vec3 mean = Vec3::Zero();
+  for (std::uint32_t i : component) mean += s.normal[i].cast<double>();
+  mean -= near.axis * near.axis.dot(mean);
+  // The surface stays, the axis moves: along the mean normal.
+  const Vec3 inwards = mean.normalized() * (near.concave ? -1.0 : 1.0);
+  FitOptions held;
+  held.hold_radius = true;
+  held.start_mm = std::min(2.5, 0.15 * near.radius);
+  held.max_surfels = 200;
+  Surface best;
+  double best_chi2 = 1e300;
+  for (double radius : limits.radii_mm) {
+    if (std::abs(radius - near.radius) > reach) continue;
+    Surface start = near;
+    start.point += inwards * (start.radius - radius);
+    start.radius = radius;
+    const Fit fit = fit_round(s, component, start, held);
+    if (!fit.valid) continue;
+    const double chi2 = capped_chi2(s, component, fit.surface, 4.0);
+    if (chi2 < best_chi2) best_chi2 = chi2, best = fit.surface;
+  }
+  if (best_chi2 == 1e300) return std::nullopt;
+  std::optional<FoundSurface> out = settle(scene, component, best, held, limits);
+  if (out) out->radius_from_cad = true;
+  return out;
 }
 
 /// Share of the support that touches what is explained already.
@@ -77,16 +131,18 @@ bool accepted(Scene& scene, const Indices& component, const FoundSurface& c, dou
 }  // namespace
 
 void polish(const Scene& scene, FoundSurface& c) {
-  if (scene.surfels.scan == nullptr) return;
   FitOptions options;
   options.hold_radius = c.radius_from_cad;
   options.cone = c.fit.surface.type == PrimitiveType::cone;
-  options.raw_pixels = true;
-  options.max_surfels = 3000;  // pixels: under correlated noise more of them say little more
-  const Fit fine = fit_round(scene.surfels, c.support, c.fit.surface, options);
-  if (!fine.valid || std::abs(fine.surface.radius - c.fit.surface.radius) > 0.1 * c.fit.surface.radius) return;
-  c.fit.surface = fine.surface;
-  c.fit.covariance = fine.covariance;
+  if (scene.surfels.scan == nullptr) {
+    const Fit full = fit_round(scene.surfels, c.support, c.fit.surface, options);
+    if (full.valid) c.fit = full;
+    return;
+  }
+  Fit fine = c.fit;
+  if (!refine_on_pixels(scene.surfels, c.support, options, scene.label, fine)) return;
+  if (std::abs(fine.surface.radius - c.fit.surface.radius) > 0.1 * c.fit.surface.radius) return;
+  c.fit = fine;
 }
 
 double arc_of(const Surfels& s, const Indices& support, const Surface& surface) {
@@ -119,40 +175,18 @@ std::optional<FoundSurface> explain_round(Scene& scene, const Indices& component
   FitOptions free;
   free.start_mm = std::min(2.5, 0.15 * rough.radius);  // a step of 3 mm must not be bridged by the kernel
   std::optional<FoundSurface> best = settle(scene, component, rough, free, limits);
-  std::size_t best_kept = best ? kept(scene, component, *best) : 0;
-  const double best_radius = best ? best->fit.surface.radius : rough.radius;
-  const double best_sigma = best ? std::sqrt(best->fit.covariance(4, 4)) : 0.2 * rough.radius;
-  const double free_arc = best ? arc_of(s, best->support, best->fit.surface) : 0;
-  if (!best || free_arc < kShortArc)
-    for (double radius : limits.radii_mm) {
-      if (std::abs(radius - best_radius) > std::max(5.0 * best_sigma, 0.2 * best_radius)) continue;
-      Surface start = best ? best->fit.surface : rough;
-      const double side = start.concave ? -1.0 : 1.0;
-      // The surface stays, the axis moves: along the mean normal.
-      Vec3 mean = Vec3::Zero();
-      for (std::uint32_t i : component) mean += s.normal[i].cast<double>();
-      mean -= start.axis * start.axis.dot(mean);
-      start.point += mean.normalized() * side * (start.radius - radius);
-      start.radius = radius;
-      FitOptions held = free;
-      held.hold_radius = true;
-      std::optional<FoundSurface> c = settle(scene, component, start, held, limits);
-      if (!c) continue;
-      c->radius_from_cad = true;
-      const std::size_t count = kept(scene, component, *c);
-      // A nominal radius replaces the free one unless it loses surfels.
-      if (!best || count > best_kept || (!best->radius_from_cad && count * 100 >= best_kept * 97) ||
-          (best->radius_from_cad && count == best_kept && c->fit.rms_sigma < best->fit.rms_sigma)) {
-        best = std::move(c);
-        best_kept = count;
-      }
-    }
+  if (!best || arc_of(s, best->support, best->fit.surface) < kShortArc) {
+    std::optional<FoundSurface> nominal = explain_by_nominal(scene, component, best ? &*best : nullptr, rough, limits);
+    // A nominal radius replaces the free one unless it loses surfels.
+    if (nominal && (!best || kept(scene, component, *nominal) * 100 >= kept(scene, component, *best) * 97))
+      best = std::move(nominal);
+  }
   if (!best) return std::nullopt;
 
   // Taper by positions: a cone must not be called a cylinder.
   FitOptions taper;
   taper.cone = true;
-  taper.max_surfels = 1500;
+  taper.max_surfels = 800;
   if (!best->radius_from_cad) {
     Fit cone = fit_round(s, best->support, best->fit.surface, taper);
     const double sigma = std::sqrt(cone.covariance(5, 5));
@@ -169,7 +203,6 @@ std::optional<FoundSurface> explain_round(Scene& scene, const Indices& component
   }
   const double arc = arc_of(s, best->support, best->fit.surface);
   if (!accepted(scene, component, *best, arc, limits)) return std::nullopt;
-  polish(scene, *best);
   best->arc = arc;
   return best;
 }
@@ -200,7 +233,6 @@ void find_cones_and_spheres(Scene& scene, const Limits& limits, std::vector<Foun
            c->support.size() < kSurfelsPerSigma * c->fit.rms_sigma ||
            std::sqrt(c->fit.covariance(4, 4)) > 0.1 * c->fit.surface.radius))
         continue;
-      polish(scene, *c);
       c->arc = arc;
       take(scene, found, std::move(*c));
     }

@@ -56,8 +56,8 @@ void find_cones_and_spheres(Scene& scene, const Limits& limits, std::vector<Foun
 std::optional<FoundSurface> explain_round(Scene& scene, const Indices& component, const Vec3& axis,
                                           const Limits& limits);
 
-/// The last fit of a surface of revolution runs on the raw pixels of a scan, because the mean of a cell lies off a
-/// tight radius; the residuals of the cells stay what the tests judge.
+/// The last fit of a surface of revolution: on the raw pixels of a scan, because the mean of a cell lies off a tight
+/// radius, else on all surfels. The residuals of the cells stay what the tests judge.
 void polish(const Scene& scene, FoundSurface& surface);
 
 /// Arc of the support about the surface's axis [rad]: the circle less its largest gap.

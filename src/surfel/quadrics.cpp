@@ -3,14 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/vector_levels.hpp"
 #include "tribin/core/parallel.hpp"
-
-// Sums of whole rows, lane by lane and never fused: each level gives the same bytes.
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_THREAD__)
-#define TRIBIN_VECTOR_LEVELS __attribute__((target_clones("avx2", "default")))
-#else
-#define TRIBIN_VECTOR_LEVELS
-#endif
 
 namespace tribin::surfel_detail {
 namespace {
