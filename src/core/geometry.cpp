@@ -28,6 +28,14 @@ Pose moved(const Pose& pose, const Vector6& delta) {
   return result;
 }
 
+Pose moved_about(const Pose& pose, const Vec3& center, const Vector6& delta) {
+  const Matrix3 turn = rotation_from_vector(delta.tail<3>());
+  Pose result = pose;
+  result.linear() = turn * pose.linear();
+  result.translation() = turn * (pose.translation() - center) + center + delta.head<3>();
+  return result;
+}
+
 void orthonormal_basis(const Vec3& axis, Vec3& u, Vec3& v) {
   // Duff et al., "Building an Orthonormal Basis, Revisited", JCGT 2017: no branch on the largest component, no pole.
   const double sign = std::copysign(1.0, axis.z());

@@ -57,15 +57,14 @@ ContourSums contour_sums(const RenderMesh& mesh, const SceneDepth& scene, const 
   double squares = 0, weights = 0;
   Eigen::Matrix<double, 6, 6> h = Eigen::Matrix<double, 6, 6>::Zero();
   Eigen::Matrix<double, 6, 1> b = Eigen::Matrix<double, 6, 1>::Zero();
-  const auto faces_camera = [&](std::int32_t t, const Eigen::Vector3d& at) {
-    return t >= 0 && (rotation * mesh.normals[static_cast<std::size_t>(t)].cast<double>()).dot(at) < 0;
-  };
+  const Vec3f eye = Vec3f((-(rotation.transpose() * camera_from_part.translation())).cast<float>());
+  const auto faces_camera = [&](std::int32_t t) { return t >= 0 && mesh.faces(static_cast<std::size_t>(t), eye); };
   for (const OutlineEdge& edge : mesh.edges) {
+    const bool front0 = faces_camera(edge.triangles[0]), front1 = faces_camera(edge.triangles[1]);
+    if (front0 == front1) continue;
     const Eigen::Vector3d p0 = camera_from_part * mesh.vertices[edge.vertices[0]].cast<double>();
     const Eigen::Vector3d p1 = camera_from_part * mesh.vertices[edge.vertices[1]].cast<double>();
     if (p0.z() <= 1 || p1.z() <= 1) continue;
-    const bool front0 = faces_camera(edge.triangles[0], p0), front1 = faces_camera(edge.triangles[1], p0);
-    if (front0 == front1) continue;
     const auto seen = static_cast<std::size_t>(edge.triangles[front0 ? 0 : 1]);
     const Eigen::Vector3d n = rotation * mesh.normals[seen].cast<double>();
     const double rho = n.dot(p0);

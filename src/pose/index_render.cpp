@@ -50,11 +50,13 @@ RenderMesh make_render_mesh(const Mesh& mesh) {
   out.triangles = mesh.triangles;
   out.two_sided = !mesh.oriented;
   out.normals.reserve(mesh.triangles.size());
+  out.offsets.reserve(mesh.triangles.size());
   for (const auto& t : mesh.triangles) {
     const Eigen::Vector3d a = mesh.vertices[t[0]].cast<double>();
     const Eigen::Vector3d n = (mesh.vertices[t[1]].cast<double>() - a).cross(mesh.vertices[t[2]].cast<double>() - a);
     const double length = n.norm();
     out.normals.push_back(length > 0 ? Vec3f((n / length).cast<float>()) : Vec3f(0, 0, 0));
+    out.offsets.push_back(static_cast<float>(out.normals.back().cast<double>().dot(a)));
   }
   out.edges = outline_edges(out);
   if (!mesh.vertices.empty()) {
@@ -128,7 +130,9 @@ void render_index(const RenderMesh& mesh, const PinholeCamera& camera, const Pos
   const float ray_x0 = (render.u0 - cx) / fx, ray_dx = step / fx;
   const float ray_y0 = (render.v0 - cy) / fy, ray_dy = step / fy;
 
+  const Vec3f eye = (-(rd.transpose() * camera_from_part.translation())).cast<float>();
   for (std::size_t k = 0; k < mesh.triangles.size(); ++k) {
+    if (!mesh.two_sided && !mesh.faces(k, eye)) continue;
     const auto& tri = mesh.triangles[k];
     const Vec3f& m = mesh.normals[k];
     const float nx = r(0, 0) * m[0] + r(0, 1) * m[1] + r(0, 2) * m[2];

@@ -179,10 +179,7 @@ Pose refine_points(const SceneDepth& scene, const Pose& start, std::span<const V
     const Eigen::Matrix<double, 6, 1> x = hm.ldlt().solve(bm);
     Vector6 delta;
     delta << x[0], x[1], x[2], x[3] / lever, x[4] / lever, x[5] / lever;
-    const Eigen::Vector3d center = pose * Eigen::Vector3d(options.center);
-    const Matrix3 turn = rotation_from_vector(delta.tail<3>());
-    pose.linear() = turn * pose.linear();
-    pose.translation() = turn * (pose.translation() - center) + center + Eigen::Vector3d(delta.head<3>());
+    pose = moved_about(pose, pose * options.center, delta);
   }
   // Rounding of repeated products: back to a rotation.
   Eigen::Quaterniond q{Eigen::Matrix3d(pose.linear())};

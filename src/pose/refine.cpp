@@ -134,10 +134,12 @@ System scaled(const Matrix6& h, const Vector6& b, const std::vector<Vector6>& fr
   return s;
 }
 
-/// Directions that hold less than a millionth of the best one's information stay where they are.
-Vec6 solve(const System& s) {
+/// Directions that the data holds to less than `weak_mm` stay where they are, and so do those with less than a
+/// millionth of the best one's information: a step along them would follow noise and local minima.
+Vec6 solve(const System& s, double weak_mm) {
   const Eigen::SelfAdjointEigenSolver<Mat6> eigen(s.h);
-  const double limit = 1e-6 * std::max(eigen.eigenvalues()(5), 1e-300);
+  const double limit =
+      std::max(1e-6 * std::max(eigen.eigenvalues()(5), 1e-300), weak_mm > 0 ? 1 / (weak_mm * weak_mm) : 0.0);
   Vec6 x = Vec6::Zero();
   for (int k = 0; k < 6; ++k)
     if (eigen.eigenvalues()(k) > limit)
@@ -151,21 +153,15 @@ Vec6 solve(const System& s) {
 constexpr double kOutlineBiasPx = 0.1;
 constexpr double kEdgeReachPx = 6;
 
-/// Adds the outline's equations; returns in how many directions they say more than the surface.
-int add_outlines(Matrix6& information, Vector6& b, const ContourSums& edges, const std::vector<Vector6>& frozen,
-                 const Vec6& scale, double bias_mm) {
-  if (edges.samples < 12) return 0;
+/// Adds the outline's equations, bounded to a precision of `bias_mm` (0 = unbounded).
+void add_outlines(Matrix6& information, Vector6& b, const ContourSums& edges, const std::vector<Vector6>& frozen,
+                  const Vec6& scale, double bias_mm) {
+  if (edges.samples < 12) return;
   const System outline = scaled(edges.information, edges.pull, frozen, scale);
   const Eigen::SelfAdjointEigenSolver<Mat6> eigen(outline.h);
   const double share = bias_mm > 0 ? std::min(1.0, 1 / (eigen.eigenvalues()(5) * bias_mm * bias_mm)) : 1.0;
-  const System surface = scaled(information, b, frozen, scale);
-  const Eigen::GeneralizedSelfAdjointEigenSolver<Mat6> compared(
-      outline.h * share, surface.h + Mat6::Identity() * 1e-9 * surface.h.trace());
-  int count = 0;
-  for (int k = 0; k < 6; ++k) count += compared.eigenvalues()(k) > 1;
   information += edges.information * share;
   b += edges.pull * share;
-  return count;
 }
 
 }  // namespace
@@ -187,8 +183,8 @@ Refinement refine_pose(const RenderMesh& mesh, const SceneDepth& scene, const Po
     const bool final_pass = it == options.iterations;
     const Eigen::Vector3d center = out.camera_from_part * Eigen::Vector3d(options.center);
     render_index(mesh, scene.camera, out.camera_from_part, options.step_px, render);
-    const Sums sums =
-        accumulate(scene, render, center, std::max(scale, end_scale), options.cad_sigma_mm, kernel, final_pass);
+    const Sums sums = accumulate(scene, render, center, final_pass ? end_scale : std::max(scale, end_scale),
+                                 options.cad_sigma_mm, kernel, final_pass);
     // Pixels nearer than the noise's correlation count once.
     const double independent =
         1 / std::max(1.0, correlation_inflation(scene.correlation_px) / (double(render.step) * render.step));
@@ -206,22 +202,19 @@ Refinement refine_pose(const RenderMesh& mesh, const SceneDepth& scene, const Po
     if (options.outlines) {
       const ContourSums edges = contour_sums(mesh, scene, out.camera_from_part, render, Vec3(center), kEdgeReachPx);
       const bool settling = it + 2 < options.iterations;
-      out.weak_by_surface = add_outlines(out.information, b, edges, options.frozen, scale6,
-                                         settling ? 0 : kOutlineBiasPx * center.z() / scene.camera.fx);
+      add_outlines(out.information, b, edges, options.frozen, scale6,
+                   settling ? 0 : kOutlineBiasPx * center.z() / scene.camera.fx);
     }
     if (final_pass) break;
-    const Vec6 step = scale6.cwiseProduct(solve(scaled(out.information, b, options.frozen, scale6)));
+    const double spread = kernel / options.kernel_sigmas;
+    const Vec6 step =
+        scale6.cwiseProduct(solve(scaled(out.information, b, options.frozen, scale6), options.weak_mm / spread));
     Vector6 delta(step);
     // A step may not outrun the association: at most the current scale's reach.
     const double length = std::max(delta.head<3>().norm(), delta.tail<3>().norm() * options.lever_mm);
     const double reach = 4 * std::max(scale, end_scale);
     if (length > reach) delta *= reach / length;
-    Pose next = out.camera_from_part;
-    const Matrix3 turn = rotation_from_vector(delta.tail<3>());
-    next.linear() = turn * out.camera_from_part.linear();
-    next.translation() =
-        turn * (out.camera_from_part.translation() - center) + center + Eigen::Vector3d(delta.head<3>());
-    out.camera_from_part = next;
+    out.camera_from_part = moved_about(out.camera_from_part, center, delta);
     scale /= ratio;
     if (length < 1e-5 && scale <= end_scale) {
       // Converged: what is left is the final pass.

@@ -133,7 +133,24 @@ RefineOptions refine_options(const Part& part, int step_px, int iterations, doub
   o.center = part.box_center();
   o.lever_mm = part.gyration_mm;
   o.cad_sigma_mm = part.mesh.chord_error_mm;
+  o.weak_mm = weak_limit_mm(part);
   return o;
+}
+
+Refinement refine_guarded(const Part& part, const SceneDepth& scene, const Pose& start, const RefineOptions& options) {
+  Refinement refined = refine_pose(part.render_mesh, scene, start, options);
+  const double tolerance = 0.002 * part.diameter_mm;
+  // A shorter way than the verification's tolerance cannot change its score.
+  if (close_poses(part, start, refined.camera_from_part, tolerance, tolerance / part.gyration_mm)) return refined;
+  const auto gain = [&](const Pose& pose) {
+    return verify_pose(part.render_mesh, scene, pose, verification_options(part, options.step_px, tolerance)).gain;
+  };
+  // 2 % is what noise and the raster move a score by between two poses that are both right (measured on heaps of gear
+  // motors).
+  if (gain(refined.camera_from_part) >= 0.98 * gain(start)) return refined;
+  RefineOptions stay = options;
+  stay.iterations = 0;
+  return refine_pose(part.render_mesh, scene, start, stay);
 }
 
 namespace {

@@ -16,6 +16,11 @@ struct PoseCandidate {
   Verification verification;
 };
 
+/// Centre of the part's box, camera frame [mm].
+inline Vec3 place_of(const Part& part, const PoseCandidate& candidate) {
+  return candidate.camera_from_part * part.box_center();
+}
+
 /// The part's view that the camera has of it at a pose.
 const PartView& view_of(const Part& part, const Pose& camera_from_part);
 
@@ -26,6 +31,14 @@ int step_for(const Part& part, const SceneDepth& scene, const Pose& camera_from_
 
 VerificationOptions verification_options(const Part& part, int step_px, double tolerance_mm);
 RefineOptions refine_options(const Part& part, int step_px, int iterations, double start_scale_mm);
+
+/// A direction of the pose that the data holds no better than this [mm at the gyration radius] is weak: 1 % of the
+/// diameter, a fifth of what counts as found. Refinement leaves it alone and the answer tells of it.
+inline double weak_limit_mm(const Part& part) { return 0.01 * part.diameter_mm; }
+
+/// refine_pose, taken back where the refined pose explains the scan worse than its start: the next slot or step of a
+/// part draws weakly held poses off.
+Refinement refine_guarded(const Part& part, const SceneDepth& scene, const Pose& start, const RefineOptions& options);
 
 /// Where hypotheses come from, cheapest and surest first.
 enum class Source { primitives, regions, sweep };

@@ -78,7 +78,7 @@ void compare(const SceneDepth& scene, const Part& part, int step, std::vector<Fi
   options.outlines = true;
   parallel_each(static_cast<int>(finalists.size()), [&](int i) {
     Finalist& f = finalists[static_cast<std::size_t>(i)];
-    const Refinement refined = refine_pose(part.render_mesh, scene, f.pose, options);
+    const Refinement refined = refine_guarded(part, scene, f.pose, options);
     f.pose = refined.camera_from_part;
     f.information = refined.information;
   });
@@ -99,15 +99,11 @@ void add_weakest_moves(const Part& part, const Finalist& from, std::vector<Pose>
   const Eigen::Matrix<double, 6, 6> h =
       scale.asDiagonal() * Eigen::Matrix<double, 6, 6>(from.information) * scale.asDiagonal();
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> eigen(h);
-  const Eigen::Vector3d center = from.pose * Eigen::Vector3d(part.box_center());
+  const Vec3 center = from.pose * part.box_center();
   // The enumeration's steps leave a pose up to half a step (4 % of the diameter at the rim) from the truth.
   for (const double share : {-0.04, -0.02, 0.02, 0.04}) {
     const Vec6 delta = scale.cwiseProduct(eigen.eigenvectors().col(0)) * (share * part.diameter_mm);
-    const Matrix3 turn = rotation_from_vector(Vec3(delta.tail<3>()));
-    Pose moved = from.pose;
-    moved.linear() = turn * from.pose.linear();
-    moved.translation() = turn * (from.pose.translation() - center) + center + delta.head<3>();
-    out.push_back(moved);
+    out.push_back(moved_about(from.pose, center, Vector6(delta)));
   }
 }
 
@@ -258,9 +254,10 @@ Polished polish(const SceneDepth& scene, std::span<const Part> parts, const Pose
   return out;
 }
 
-bool acceptable(const Part& part, const Verification& v, std::vector<Reason>& rejected) {
+bool acceptable(const Part& part, const PoseCandidate& candidate, std::vector<Reason>& rejected) {
+  const Verification& v = candidate.verification;
   const auto fails = [&](const char* test, double value, double limit, bool bad) {
-    if (bad) add_reason(rejected, {part.name, "verification", test, value, limit});
+    if (bad) add_reason(rejected, {part.name, "verification", test, value, limit, 1, place_of(part, candidate)});
     return bad;
   };
   // 40 supported pixels fix a pose no better than chance does; less is not a look at a part.

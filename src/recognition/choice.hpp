@@ -35,6 +35,6 @@ std::vector<double> log_likelihoods(const SceneDepth& scene, std::span<const std
 Polished polish(const SceneDepth& scene, std::span<const Part> parts, const PoseCandidate& candidate);
 
 /// Limits that an answer must keep. Value and limit go into `rejected` when one fails.
-bool acceptable(const Part& part, const Verification& verification, std::vector<Reason>& rejected);
+bool acceptable(const Part& part, const PoseCandidate& candidate, std::vector<Reason>& rejected);
 
 }  // namespace tribin

@@ -64,7 +64,7 @@ Instance make_instance(const Polished& p, std::span<const Part> parts, const Sce
   RefineOptions options = refine_options(part, step, 3, std::max(0.002 * part.diameter_mm, 4 * scene.median_sigma_mm));
   options.outlines = true;
   options.frozen = free_directions_about_center(part, p.candidate.camera_from_part);
-  const Refinement refined = refine_pose(part.render_mesh, scene, p.candidate.camera_from_part, options);
+  const Refinement refined = refine_guarded(part, scene, p.candidate.camera_from_part, options);
   out.camera_from_part = refined.camera_from_part;
   describe_uncertainty(part, noise, refined, out);
   describe_evidence(part, scene, features, out);
@@ -105,6 +105,22 @@ Instance make_instance(const Polished& p, std::span<const Part> parts, const Sce
   return out;
 }
 
+/// Tells of each refusal which answer its nearest miss lies next to.
+void name_neighbours(std::span<const Part> parts, Instances& found) {
+  for (Reason& reason : found.rejected) {
+    if (!reason.at_mm) continue;
+    double nearest = 0;
+    for (const Instance& instance : found.items) {
+      const auto part =
+          std::find_if(parts.begin(), parts.end(), [&](const Part& p) { return p.name == instance.part; });
+      const double distance = (instance.camera_from_part * part->box_center() - *reason.at_mm).norm();
+      if (reason.nearest_instance != 0 && distance >= nearest) continue;
+      reason.nearest_instance = instance.id;
+      nearest = distance;
+    }
+  }
+}
+
 /// Best first: each place of the scan goes to the pose, of any part, that explains it best.
 std::vector<Polished> choose(const SceneDepth& scene, std::span<const Part> parts,
                              std::vector<PoseCandidate> candidates, std::vector<Reason>& rejected) {
@@ -124,8 +140,9 @@ std::vector<Polished> choose(const SceneDepth& scene, std::span<const Part> part
     if (candidates[i].verification.gain <= 0) break;  // more speaks against it and all that follow than for them
     if (masks[i].count == 0 || overlap(claimed, masks[i]) > kOverlap) {
       done[i] = true;
-      add_reason(rejected, {parts[static_cast<std::size_t>(candidates[i].part)].name, "selection", "overlap",
-                            overlap(claimed, masks[i]), kOverlap});
+      const Part& part = parts[static_cast<std::size_t>(candidates[i].part)];
+      add_reason(rejected, {part.name, "selection", "overlap", overlap(claimed, masks[i]), kOverlap, 1,
+                            place_of(part, candidates[i])});
       continue;
     }
     // The rivals for this place: the best two of each part that are not far behind.
@@ -152,11 +169,13 @@ std::vector<Polished> choose(const SceneDepth& scene, std::span<const Part> part
     for (const std::size_t k : rivals) done[k] = true;
     Polished& winner = polished[best];
     const Part& part = parts[static_cast<std::size_t>(winner.candidate.part)];
-    if (!acceptable(part, winner.candidate.verification, rejected)) continue;
-    for (std::size_t k = 0; k < polished.size(); ++k)
-      if (k != best)
-        add_reason(rejected, {parts[static_cast<std::size_t>(polished[k].candidate.part)].name, "selection",
-                              "log_likelihood", likelihood[k] - likelihood[best], 0});
+    if (!acceptable(part, winner.candidate, rejected)) continue;
+    for (std::size_t k = 0; k < polished.size(); ++k) {
+      if (k == best) continue;
+      const Part& other = parts[static_cast<std::size_t>(polished[k].candidate.part)];
+      add_reason(rejected, {other.name, "selection", "log_likelihood", likelihood[k] - likelihood[best], 0, 1,
+                            place_of(other, polished[k].candidate)});
+    }
     claimed.join(winner.mask);
     winners.push_back(std::move(winner));
   }
@@ -196,7 +215,8 @@ Instances recognize(const Primitives& primitives, const PrimitiveModel& observat
         for (const Alternative& a : instance.alternatives) main -= a.probability;
         // Which of its self-similar poses it is in may be open; that it is there may not.
         if (const double sure = instance.score / main; sure < kSureEnough)
-          add_reason(out.rejected, {instance.part, "acceptance", "probability", sure, kSureEnough});
+          add_reason(out.rejected, {instance.part, "acceptance", "probability", sure, kSureEnough, 1,
+                                    place_of(parts[static_cast<std::size_t>(w.candidate.part)], w.candidate)});
         else
           out.items.push_back(std::move(instance));
       }
@@ -206,6 +226,7 @@ Instances recognize(const Primitives& primitives, const PrimitiveModel& observat
   std::stable_sort(out.items.begin(), out.items.end(),
                    [](const Instance& a, const Instance& b) { return a.score > b.score; });
   for (std::size_t i = 0; i < out.items.size(); ++i) out.items[i].id = static_cast<int>(i) + 1;
+  name_neighbours(parts, out);
   out.unexplained = std::any_of(parts.begin(), parts.end(), [&](const Part& p) { return anything_left(features, p); });
   return out;
 }

@@ -56,16 +56,13 @@ void describe_uncertainty(const Part& part, const NoiseProfile& noise, const Ref
   h = keep * h * keep;
   const Eigen::SelfAdjointEigenSolver<Mat6> eigen(h);
   const std::size_t free_count = part.symmetry.continuous.size();
-  // Weak: not held better than 1 % of the diameter, a fifth of what counts as found. Such a direction keeps that spread
-  // at least.
-  const double weak_limit = 0.01 * part.diameter_mm;
   Mat6 covariance = Mat6::Zero();
   for (int k = static_cast<int>(free_count); k < 6; ++k) {
     const double information = std::max(eigen.eigenvalues()(k) / inflation, 1 / (part.diameter_mm * part.diameter_mm));
     const Vec6 e = eigen.eigenvectors().col(k);
     const double sigma = 1 / std::sqrt(information);
     covariance += e * e.transpose() * (sigma * sigma);
-    if (sigma > weak_limit) {
+    if (sigma > weak_limit_mm(part)) {
       WeakDirection weak;
       const Vec6 d = origin_from_center(part, instance.camera_from_part) * Vec6(scale.cwiseProduct(e));
       weak.direction = Vector6(d.normalized());

@@ -70,15 +70,17 @@ Json instance_json(const Instance& instance, const Pose& input_from_camera) {
   return out;
 }
 
-Json reason_json(const Reason& reason) {
+Json reason_json(const Reason& reason, const Pose& input_from_camera) {
   Json out = {{"part", reason.part},
               {"stage", reason.stage},
               {"test", reason.test},
               {"value", json::significant(reason.value)},
               {"limit", json::significant(reason.limit)},
               {"count", reason.count}};
-  if (reason.nearest_instance > 0)
-    out["nearest"] = {{"instance", reason.nearest_instance}, {"distance_mm", json::rounded(reason.nearest_mm, 2)}};
+  if (reason.at_mm) {
+    out["nearest"]["instance"] = reason.nearest_instance > 0 ? Json(reason.nearest_instance) : Json();
+    out["nearest"]["at_mm"] = json::millimetres(Vec3(input_from_camera * *reason.at_mm));
+  }
   return out;
 }
 
@@ -92,7 +94,8 @@ std::string locate_json(const Scan& scan, const Found& found, const JsonOptions&
   for (const Instance& instance : found.instances.items)
     out["instances"].push_back(instance_json(instance, scan.input_from_camera));
   out["rejected"] = Json::array();
-  for (const Reason& reason : found.instances.rejected) out["rejected"].push_back(reason_json(reason));
+  for (const Reason& reason : found.instances.rejected)
+    out["rejected"].push_back(reason_json(reason, scan.input_from_camera));
   out["primitives"] = json::counts(found.primitives.items);
   out["warnings"] = json::warnings(found.warnings, scan.warnings);
   if (options.times) out["stages_ms"] = json::stages(found.times);

@@ -252,8 +252,7 @@ std::string why_not_section(std::span<const Part> parts, const Found& found) {
     const double size = std::max(std::abs(r.value), std::abs(r.limit));
     const int decimals = size >= 100 ? 0 : size >= 1 ? 2 : 3;
     out += "<tr><td>" + named(parts, r.part) +
-           (r.nearest_instance > 0 ? " <span class=\"muted\">" + number(r.nearest_mm, 0) + " mm from " +
-                                         std::to_string(r.nearest_instance) + "</span>"
+           (r.nearest_instance > 0 ? " <span class=\"muted\">beside " + std::to_string(r.nearest_instance) + "</span>"
                                    : "") +
            "</td><td class=\"wrap\">" + sentence_of(r) + " <span class=\"muted\">" + escaped(r.stage + ", " + r.test) +
            "</span></td>" + cell(number(r.value, decimals)) + cell(number(r.limit, decimals)) + cell(grouped(r.count)) +

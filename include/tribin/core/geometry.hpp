@@ -28,6 +28,8 @@ Vec3 vector_from_rotation(const Matrix3& rotation);
 double rotation_angle(const Matrix3& a, const Matrix3& b);
 /// The pose moved by (dt in mm, w in rad), both in the target frame's axes: R' = Exp(w) R, t' = t + dt.
 Pose moved(const Pose& pose, const Vector6& delta);
+/// The same with the rotation about `center` (target frame), which moves by dt.
+Pose moved_about(const Pose& pose, const Vec3& center, const Vector6& delta);
 /// Two unit vectors u, v with (u, v, axis) right-handed and orthonormal; a fixed function of the axis.
 void orthonormal_basis(const Vec3& axis, Vec3& u, Vec3& v);
 

@@ -21,10 +21,17 @@ struct RenderMesh {
   std::vector<Vec3f> vertices;  ///< part frame, mm
   std::vector<std::array<std::uint32_t, 3>> triangles;
   std::vector<Vec3f> normals;      ///< unit, outward, one a triangle
+  std::vector<float> offsets;      ///< normal . vertex [mm], one a triangle
   std::vector<OutlineEdge> edges;  ///< those that can be an outline: not between coplanar triangles
   bool two_sided = false;          ///< the mesh has no known orientation
   Vec3 box_min = Vec3::Zero();
   Vec3 box_max = Vec3::Zero();
+
+  /// Does a triangle look at a camera at `eye` (part frame)?
+  bool faces(std::size_t triangle, const Vec3f& eye) const {
+    const Vec3f& n = normals[triangle];
+    return n[0] * eye[0] + n[1] * eye[1] + n[2] * eye[2] > offsets[triangle];
+  }
 };
 
 RenderMesh make_render_mesh(const Mesh& mesh);
@@ -45,7 +52,7 @@ struct IndexRender {
 
 /// Renders the part at a pose with a z-buffer; every `step`-th pixel each way.
 /// \param render  filled; its buffers are reused between calls.
-/// \cost          about 40 ns a triangle plus 2 ns a covered pixel.
+/// \cost          about 2 ns a vertex, 15 ns a triangle that faces the camera, 2 ns a covered pixel.
 void render_index(const RenderMesh& mesh, const PinholeCamera& camera, const Pose& camera_from_part, int step,
                   IndexRender& render);
 

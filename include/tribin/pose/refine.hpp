@@ -8,10 +8,11 @@
 namespace tribin {
 
 struct RefineOptions {
-  int iterations = 8;           ///< 1..50
+  int iterations = 8;           ///< 0..50; 0 leaves the pose and tells its information
   int step_px = 1;              ///< every n-th pixel each way
   double start_scale_mm = 2.0;  ///< residual at which a pixel counts half, at the start; ends at 3 local sigma
-  std::vector<Vector6> frozen;  ///< directions (mm, rad about `center`) that must not move: free by symmetry, or weak
+  std::vector<Vector6> frozen;  ///< directions (mm, rad about `center`) that must not move: free by symmetry
+  double weak_mm = 0;           ///< directions that the data holds to less than this sd are not moved; 0 = all are
   Vec3 center = Vec3::Zero();   ///< part frame; rotations turn about it (the box centre)
   double lever_mm = 1;          ///< length that turns radians into mm when directions are compared (radius of gyration)
   double kernel_sigmas = 3;     ///< the kernel ends at so many local sigma; > 0
@@ -23,10 +24,9 @@ struct Refinement {
   Pose camera_from_part = Pose::Identity();
   /// Of (dt in mm, w in rad about the centre), camera axes: pixels (noise correlation and step counted) and outlines.
   Matrix6 information = Matrix6::Zero();
-  int weak_by_surface = 0;  ///< directions that the outlines hold better than the surface
-  int pixels = 0;           ///< that hold the pose
-  double rms_mm = 0;        ///< of their residuals along the surface normal
-  double rms_sigma = 0;     ///< the same in units of the local sigma
+  int pixels = 0;        ///< that hold the pose
+  double rms_mm = 0;     ///< of their residuals along the surface normal
+  double rms_sigma = 0;  ///< the same in units of the local sigma
 };
 
 /// Moves a pose so that the CAD surface meets the scan: projective association by an index render, point-to-plane
