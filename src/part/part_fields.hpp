@@ -29,8 +29,8 @@ void each_field(Archive& to, T& mesh) {
 
 template <class Archive, Is<RenderMesh> T>
 void each_field(Archive& to, T& mesh) {
-  auto& [vertices, triangles, normals, edges, two_sided, box_min, box_max] = mesh;
-  to(vertices, triangles, normals, edges, two_sided, box_min, box_max);
+  auto& [vertices, triangles, normals, offsets, edges, two_sided, box_min, box_max] = mesh;
+  to(vertices, triangles, normals, offsets, edges, two_sided, box_min, box_max);
 }
 
 template <class Archive, Is<BoundaryCircle> T>

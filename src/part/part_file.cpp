@@ -146,9 +146,9 @@ bool is_sound(const Part& part) {
   bool sound = triangles > 0 && all_below(part.mesh.triangles, part.mesh.vertices.size()) &&
                (part.mesh.face_of_triangle.empty() || part.mesh.face_of_triangle.size() == triangles) &&
                render.triangles.size() == triangles && render.normals.size() == triangles &&
-               all_below(render.triangles, render.vertices.size()) && part.primitive_of_triangle.size() == triangles &&
-               below(part.primitive_of_triangle, primitives + 1) && part.exposed_mm2.size() == primitives &&
-               !part.symmetry.discrete.empty() && !part.views.empty();
+               render.offsets.size() == triangles && all_below(render.triangles, render.vertices.size()) &&
+               part.primitive_of_triangle.size() == triangles && below(part.primitive_of_triangle, primitives + 1) &&
+               part.exposed_mm2.size() == primitives && !part.symmetry.discrete.empty() && !part.views.empty();
   for (const OutlineEdge& e : render.edges) {
     sound = sound && below(e.vertices, render.vertices.size());
     for (std::int32_t t : e.triangles) sound = sound && t >= -1 && t < static_cast<std::int64_t>(triangles);
