@@ -80,6 +80,36 @@ TEST(RefinePose, LeavesAFrozenDirectionAlone) {
   EXPECT_NEAR(refined.camera_from_part.translation().z(), start.translation().z(), 1e-9);
 }
 
+TEST(RefinePose, LeavesAlongAFaceAloneWhatTheFaceDoesNotHold) {
+  // The top of a plate, seen along its normal: three directions are held to microns, three by nothing.
+  Mesh plate;
+  test::add_box(plate, Vec3f(-60, -45, -8), Vec3f(60, 45, 0));
+  Mesh sight = plate;  // what is seen goes on beyond the part: no outline helps
+  test::add_box(sight, Vec3f(-160, -145, -8), Vec3f(160, 145, 0));
+  for (unsigned seed = 1; seed <= 6; ++seed) {
+    SCOPED_TRACE(seed);
+    Pose truth = Pose::Identity();
+    truth.linear() = rotation_from_vector(Vec3(kPi, 0, 0));
+    truth.translation() = Eigen::Vector3d(0, 0, 600);
+    const Scan scan = test::posed_scan({{&sight, truth}}, Vec3(0, 0, -1), -720, 0.1, 0.6, seed);
+    const Surfels surfels = surfels_from_scan(scan);
+    const SceneDepth scene = make_scene_depth(scan, surfels);
+    Vector6 off;
+    off << 1.5, -1, 0.5, 0.005, -0.004, 0.02;
+    RefineOptions options = options_for_block();
+    options.weak_mm = 1;
+    options.outlines = true;
+    const Pose start = moved(truth, off);
+    const Pose refined = refine_pose(make_render_mesh(plate), scene, start, options).camera_from_part;
+    const Eigen::Vector3d shift = refined.translation() - start.translation();
+    EXPECT_LT(std::hypot(shift.x(), shift.y()), 0.02);  // what the tilt's correction gives, nothing slides
+    EXPECT_NEAR(refined.translation().z(), truth.translation().z(), 0.02);
+    EXPECT_LT(
+        rotation_angle(Matrix3(refined.linear() * truth.linear().transpose()), rotation_from_vector(Vec3(0, 0, 0.02))),
+        0.02 * kDegree);
+  }
+}
+
 TEST(RefinePose, GivesTheSameBytesOnAnyNumberOfThreads) {
   const Mesh mesh = stepped_block();
   const Pose truth = test::random_pose(600, 5);
