@@ -106,10 +106,12 @@ double meet(const Surface& c, const Vec3& ray) {
 /// Whether the scan looks through the surface between the two pieces: something seen behind it says that it ends there.
 bool seen_through(const Scene& scene, const Surface& joint, double scale, const Indices& a, const Indices& b) {
   const Surfels& s = scene.surfels;
+  if (joint.type == PrimitiveType::sphere) return false;
   const Extent ea = extent_of(s, a, joint), eb = extent_of(s, b, joint);
   const double low = std::min(ea.high, eb.high), high = std::max(ea.low, eb.low);
   if (high - low < 3 * scene.cell_mm) return false;  // side by side: no room for an end
-  if (s.scan == nullptr) return true;                // without a camera nothing says that the gap is hidden
+  // Without a camera nothing says that the gap is hidden; rays that meet a cone are not followed.
+  if (s.scan == nullptr || joint.type == PrimitiveType::cone) return true;
   std::size_t hits = 0, behind = 0;
   for (std::uint32_t i = 0; i < s.size(); ++i) {
     const Vec3 p = s.position[i].cast<double>();
@@ -137,16 +139,33 @@ double chi2_of(const Surfels& s, const Indices& support, const Surface& surface,
   return sum;
 }
 
-/// One surface in place of two, where it explains both as well as its fewer parameters ask.
-std::optional<FoundSurface> joined(Scene& scene, const FoundSurface& a, const FoundSurface& b, double waves) {
+int parameters_of(PrimitiveType type) {
+  switch (type) {
+    case PrimitiveType::plane:
+      return 3;
+    case PrimitiveType::sphere:
+      return 4;
+    case PrimitiveType::cylinder:
+      return 5;
+    case PrimitiveType::cone:
+      return 6;
+  }
+  return 0;
+}
+
+/// One surface of `type` in place of two, where it explains both as well as its fewer parameters ask.
+std::optional<FoundSurface> joined(Scene& scene, const FoundSurface& a, const FoundSurface& b, PrimitiveType type,
+                                   double waves) {
   const Surfels& s = scene.surfels;
   Indices both = a.support;
   both.insert(both.end(), b.support.begin(), b.support.end());
   FitOptions options;
   options.hold_radius = a.radius_from_cad && b.radius_from_cad;
+  options.cone = type == PrimitiveType::cone;
   options.max_surfels = 1500;
   const Fit fit = fit_round(s, both, a.fit.surface, options);
   if (!fit.valid || fit.rms_sigma > kMaxRmsSigma) return std::nullopt;
+  if (type == PrimitiveType::cone && !tapers(fit)) return std::nullopt;
   const double scale = std::max(a.fit.scale, b.fit.scale);
   const double apart = chi2_of(s, a.support, a.fit.surface, scale) + chi2_of(s, b.support, b.fit.surface, scale);
   const double together = chi2_of(s, both, fit.surface, scale);
@@ -154,8 +173,8 @@ std::optional<FoundSurface> joined(Scene& scene, const FoundSurface& a, const Fo
   // leave, and correlated data are as many as their information says.
   const double count = static_cast<double>(both.size()), inflation = correlation_inflation(s) * waves;
   const double variance = std::max(1.0, apart / count) * inflation;
-  const double parameters = fit.surface.type == PrimitiveType::sphere ? 4 : 5;
-  if ((together - apart) / variance > parameters * std::log(std::max(2.0, count / inflation))) return std::nullopt;
+  const int saved = parameters_of(a.fit.surface.type) + parameters_of(b.fit.surface.type) - parameters_of(type);
+  if ((together - apart) / variance > saved * std::log(std::max(2.0, count / inflation))) return std::nullopt;
   if (seen_through(scene, fit.surface, fit.scale, a.support, b.support)) return std::nullopt;
   FoundSurface out;
   out.fit = fit;
@@ -165,28 +184,52 @@ std::optional<FoundSurface> joined(Scene& scene, const FoundSurface& a, const Fo
   return out;
 }
 
+/// Whether most of a support lies on a surface that was fitted without it.
+bool mostly_on(const Surfels& s, const Indices& support, const Fit& fit) {
+  constexpr std::size_t kSample = 64;
+  const std::size_t stride = 1 + support.size() / kSample;
+  std::size_t on = 0, count = 0;
+  for (std::size_t i = 0; i < support.size(); i += stride, ++count)
+    on += fits(s, support[i], fit.surface, 2.0 * fit.scale, kRoundSlack);
+  return 2 * on > count;
+}
+
+/// What may replace two surfaces: one of the larger's kind, or a cone of which both are strips.
+std::optional<FoundSurface> one_of(Scene& scene, const FoundSurface& large, const FoundSurface& small) {
+  const Surface &p = large.fit.surface, &q = small.fit.surface;
+  const bool alike = p.type == q.type && p.concave == q.concave;
+  const auto same = [&](double waves) {
+    if (!alike || std::abs(p.radius - q.radius) > 0.2 * std::max(p.radius, q.radius)) return false;
+    if (p.type == PrimitiveType::sphere) return same_sphere(large.fit, small.fit, waves);
+    if (p.type != PrimitiveType::cylinder || std::abs(p.axis.dot(q.axis)) < std::cos(kMaxTilt)) return false;
+    return same_cylinder(large.fit, small.fit, waves);
+  };
+  // Where even the slowest waves would not make them one, their waves need not be known.
+  const bool covered = mostly_on(scene.surfels, small.support, large.fit);
+  if (!covered && !same(kMostWaves)) return std::nullopt;
+  const double waves = std::max(wave_inflation(scene, large), wave_inflation(scene, small));
+  if (!covered && !same(waves)) return std::nullopt;
+  std::optional<FoundSurface> one = joined(scene, large, small, p.type, waves);
+  if (!one && p.type == PrimitiveType::cylinder && q.type != PrimitiveType::plane)
+    one = joined(scene, large, small, PrimitiveType::cone, waves);
+  return one;
+}
+
 }  // namespace
 
 void merge_pieces(Scene& scene, std::vector<FoundSurface>& found) {
+  std::vector<std::size_t> order(found.size());
+  for (std::size_t i = 0; i < found.size(); ++i) order[i] = i;
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return found[a].support.size() > found[b].support.size(); });
   std::vector<bool> gone(found.size(), false);
   bool any = false;
-  for (std::size_t i = 0; i < found.size(); ++i)
-    for (std::size_t j = i + 1; !gone[i] && j < found.size(); ++j) {
-      const Surface &p = found[i].fit.surface, &q = found[j].fit.surface;
-      if (gone[j] || p.type != q.type || p.concave != q.concave) continue;
-      if (p.type != PrimitiveType::cylinder && p.type != PrimitiveType::sphere) continue;
-      const bool sphere = p.type == PrimitiveType::sphere;
-      if (!sphere && std::abs(p.axis.dot(q.axis)) < std::cos(kMaxTilt)) continue;
-      if (std::abs(p.radius - q.radius) > 0.2 * std::max(p.radius, q.radius)) continue;
-      // Where even the slowest waves would not make them one, their waves need not be known.
-      if (!(sphere ? same_sphere(found[i].fit, found[j].fit, kMostWaves)
-                   : same_cylinder(found[i].fit, found[j].fit, kMostWaves)))
-        continue;
-      const double waves = std::max(wave_inflation(scene, found[i]), wave_inflation(scene, found[j]));
-      const bool same =
-          sphere ? same_sphere(found[i].fit, found[j].fit, waves) : same_cylinder(found[i].fit, found[j].fit, waves);
-      if (!same) continue;
-      std::optional<FoundSurface> one = joined(scene, found[i], found[j], waves);
+  for (std::size_t a = 0; a < order.size(); ++a)
+    for (std::size_t b = a + 1; b < order.size(); ++b) {
+      const std::size_t i = order[a], j = order[b];
+      if (gone[i]) break;
+      if (gone[j] || found[i].fit.surface.type == PrimitiveType::plane) continue;
+      std::optional<FoundSurface> one = one_of(scene, found[i], found[j]);
       if (!one) continue;
       // Grown anew: it may reach surfels between them that neither could reach alone.
       for (std::uint32_t k : one->support) scene.label[k] = 0;
@@ -195,7 +238,7 @@ void merge_pieces(Scene& scene, std::vector<FoundSurface>& found) {
       one->arc = arc_of(scene.surfels, one->support, one->fit.surface);
       found[i] = std::move(*one);
       gone[j] = any = true;
-      j = i;  // the larger piece may reach what the smaller did not
+      b = a;  // the larger piece may reach what the smaller did not
     }
   if (!any) return;
   std::vector<std::int32_t> id(found.size() + 1, 0);

@@ -1,8 +1,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/vector_levels.hpp"
 #include "segmentation/round_fit.hpp"
+#include "tribin/core/vector_levels.hpp"
 
 namespace tribin::segmentation_detail {
 namespace {

@@ -141,8 +141,18 @@ void polish(const Scene& scene, FoundSurface& c) {
   }
   Fit fine = c.fit;
   if (!refine_on_pixels(scene.surfels, c.support, options, scene.label, fine)) return;
+  if (options.cone && !tapers(fine)) {  // what the cells took for a taper the pixels do not bear out
+    options.cone = false;
+    fine.surface.type = PrimitiveType::cylinder;
+    fine.surface.half_angle = 0;
+    if (!refine_on_pixels(scene.surfels, c.support, options, scene.label, fine)) return;
+  }
   if (std::abs(fine.surface.radius - c.fit.surface.radius) > 0.1 * c.fit.surface.radius) return;
   c.fit = fine;
+}
+
+bool tapers(const Fit& cone) {
+  return std::abs(cone.surface.half_angle) > std::max(5.0 * std::sqrt(cone.covariance(5, 5)), 0.7 * kDegree);
 }
 
 double arc_of(const Surfels& s, const Indices& support, const Surface& surface) {
@@ -189,15 +199,13 @@ std::optional<FoundSurface> explain_round(Scene& scene, const Indices& component
   taper.max_surfels = 800;
   if (!best->radius_from_cad) {
     Fit cone = fit_round(s, best->support, best->fit.surface, taper);
-    const double sigma = std::sqrt(cone.covariance(5, 5));
-    if (cone.valid && std::abs(cone.surface.half_angle) > std::max(5.0 * sigma, 0.7 * kDegree) &&
-        cone.rms_sigma < 0.8 * best->fit.rms_sigma) {
+    if (cone.valid && tapers(cone) && cone.rms_sigma < 0.8 * best->fit.rms_sigma) {
       FoundSurface c;
       c.fit = cone;
       c.support = grow(scene, cone.surface, best->support, cone.scale, kRoundSlack);
       if (c.support.size() >= limits.min_surfels) {
         c.fit = fit_round(s, c.support, cone.surface, taper);
-        if (c.fit.valid) best = std::move(c);
+        if (c.fit.valid && tapers(c.fit)) best = std::move(c);
       }
     }
   }

@@ -43,9 +43,10 @@ void find_cylinders(Scene& scene, const Limits& limits, HoughSpaces& spaces, std
 /// cylinders whose surfels bend too little, or are too few, for rulings of their own.
 void find_by_great_circles(Scene& scene, const Limits& limits, HoughSpaces& spaces, std::vector<FoundSurface>& found);
 
-/// Joins pieces of one cylinder or sphere that something hides or interrupts: parameters equal within their joint
-/// covariance (chi-square), a joint fit that explains both as well as two fits do, and, along the axis, nothing seen
-/// behind the surface in the gap. Planes stay apart: each is a face.
+/// Joins pieces of one surface that something hides or interrupts, and strips that were taken for another one (of a
+/// cone as a cylinder): parameters equal within their joint covariance (chi-square) or one piece on the other's
+/// surface, a joint fit that explains both as well as two fits do, and, along the axis, nothing seen behind the surface
+/// in the gap. Planes stay apart: each is a face.
 void merge_pieces(Scene& scene, std::vector<FoundSurface>& found);
 
 /// What rulings do not explain: cones with wide angles and spheres, from components of curved surfels.
@@ -59,6 +60,10 @@ std::optional<FoundSurface> explain_round(Scene& scene, const Indices& component
 /// The last fit of a surface of revolution: on the raw pixels of a scan, because the mean of a cell lies off a tight
 /// radius, else on all surfels. The residuals of the cells stay what the tests judge.
 void polish(const Scene& scene, FoundSurface& surface);
+
+/// Whether a cone's fit proves that it is no cylinder: its half angle against its own sigma, and against what bends and
+/// slow waves of a sensor feign.
+bool tapers(const Fit& cone);
 
 /// Arc of the support about the surface's axis [rad]: the circle less its largest gap.
 double arc_of(const Surfels& surfels, const Indices& support, const Surface& surface);

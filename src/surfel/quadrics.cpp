@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/vector_levels.hpp"
 #include "tribin/core/parallel.hpp"
+#include "tribin/core/vector_levels.hpp"
 
 namespace tribin::surfel_detail {
 namespace {

@@ -60,5 +60,21 @@ TEST(PrimitiveScenes, CylindersAtTheirBound) {
     }
 }
 
+TEST(PrimitiveScenes, ConesAndSpheresAtTheirBound) {
+  unsigned seed = 11;
+  for (double sigma : {0.05, 0.2})
+    for (double correlation : {0.0, 1.5}) {
+      SCOPED_TRACE(seed);
+      PrimitiveSceneOptions options;
+      options.width = 720;
+      options.height = 480;
+      options.sigma_mm = sigma;
+      options.correlation_px = correlation;
+      options.cylinders = 0;
+      options.cones = options.spheres = 5;
+      check(options, seed++);
+    }
+}
+
 }  // namespace
 }  // namespace tribin
