@@ -145,15 +145,52 @@ CadFace exact_face(const TopoDS_Shape& shape, int id, double tolerance) {
   GProp_GProps properties;
   BRepGProp::SurfaceProperties(face, properties);
   result.area_mm2 = std::abs(properties.Mass());
-  // Odd steps: the middle of a face is where a pole or an apex likes to lie.
-  const std::vector<SurfacePoint> points = surface_grid(face, surface, 5);
-  if (points.empty()) return result;
-  const SurfacePoint at = points[points.size() / 2];
-  if (result.type == SurfaceType::plane && result.axis.dot(at.normal) < 0) result.axis = -result.axis;
-  // The axis points from the apex into the nappe on which the face lies.
-  if (result.type == SurfaceType::cone && result.axis.dot(at.position - result.point) < 0) result.axis = -result.axis;
-  result.concave = at.normal.dot(outwards(result, at.position)) < 0;
   return result;
+}
+
+double distance_to(const CadFace& f, const Vec3& p) {
+  const double along = f.axis.dot(p - f.point), radial = across(f, p).norm();
+  switch (f.type) {
+    case SurfaceType::plane:
+      return std::abs(along);
+    case SurfaceType::cylinder:
+      return std::abs(radial - f.radius_mm);
+    case SurfaceType::cone:
+      return std::abs(radial * std::cos(f.half_angle) - std::abs(along) * std::sin(f.half_angle));
+    case SurfaceType::sphere:
+      return std::abs((p - f.point).norm() - f.radius_mm);
+    case SurfaceType::torus:
+      return std::abs(std::hypot(radial - f.radius_mm, along) - f.minor_radius_mm);
+    case SurfaceType::free_form:
+      return 0;
+  }
+  return 0;
+}
+
+void take_sides_of_triangles(Mesh& mesh) {
+  struct Sum {
+    Vec3 normal = Vec3::Zero();
+    double outwards = 0, along = 0;
+  };
+  std::vector<Sum> sums(mesh.faces.size());
+  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+    const auto id = static_cast<std::size_t>(mesh.face_of_triangle[i]) - 1;
+    const auto& [a, b, c] = mesh.triangles[i];
+    const Vec3 p = mesh.vertices[a].cast<double>(), q = mesh.vertices[b].cast<double>(),
+               r = mesh.vertices[c].cast<double>();
+    const Vec3 normal = (q - p).cross(r - p), middle = (p + q + r) / 3;
+    const CadFace& face = mesh.faces[id];
+    sums[id].normal += normal;
+    sums[id].outwards += normal.dot(outwards(face, middle).normalized());
+    sums[id].along += normal.norm() * face.axis.dot(middle - face.point);
+  }
+  for (std::size_t i = 0; i < sums.size(); ++i) {
+    CadFace& face = mesh.faces[i];
+    if (face.type == SurfaceType::plane && face.axis.dot(sums[i].normal) < 0) face.axis = -face.axis;
+    // The axis points from the apex into the nappe on which the face lies.
+    if (face.type == SurfaceType::cone && sums[i].along < 0) face.axis = -face.axis;
+    face.concave = sums[i].outwards < 0;
+  }
 }
 
 }  // namespace tribin::detail

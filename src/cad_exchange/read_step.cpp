@@ -1,8 +1,10 @@
 #include "tribin/cad_exchange/read_step.hpp"
 
+#include <BRepBndLib.hxx>
 #include <BRepBuilderAPI_MakeSolid.hxx>
 #include <BRepBuilderAPI_Sewing.hxx>
 #include <BRep_Builder.hxx>
+#include <Bnd_Box.hxx>
 #include <IGESControl_Reader.hxx>
 #include <Interface_Static.hxx>
 #include <Message.hxx>
@@ -13,6 +15,8 @@
 #include <TopExp_Explorer.hxx>
 #include <TopoDS.hxx>
 #include <TopoDS_Compound.hxx>
+#include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <mutex>
@@ -52,6 +56,13 @@ void check_start(const std::string& path, const std::string& wanted, std::size_t
   }
 }
 
+/// Gaps between the loose faces of CAD writers stay below 0.01 mm; on a part of some mm that would close what is open.
+double sewing_tolerance(const TopoDS_Shape& shape) {
+  Bnd_Box box;
+  BRepBndLib::AddClose(shape, box);
+  return box.IsVoid() ? 1e-2 : std::min(1e-2, 1e-4 * std::sqrt(box.SquareExtent()));
+}
+
 /// Shells that are closed become solids, so that their orientation is known.
 TopoDS_Shape solids_of_sewn(const TopoDS_Shape& sewn) {
   TopoDS_Compound compound;
@@ -69,6 +80,14 @@ TopoDS_Shape solids_of_sewn(const TopoDS_Shape& sewn) {
   return compound;
 }
 
+Mesh named_mesh(const std::string& path, const TopoDS_Shape& shape, const TessellationOptions& options) {
+  try {
+    return detail::mesh_of_shape(shape, options);
+  } catch (const Error& error) {
+    throw Error(error.code(), path + ": " + error.what());
+  }
+}
+
 template <class Reader>
 Mesh read(const std::string& path, const TessellationOptions& options, const std::string& format) {
   const std::lock_guard lock(g_open_cascade);
@@ -82,12 +101,12 @@ Mesh read(const std::string& path, const TessellationOptions& options, const std
     TopoDS_Shape shape = reader.OneShape();
     if (!shape.IsNull() && TopExp_Explorer(shape, TopAbs_FACE).More()) {
       if (!TopExp_Explorer(shape, TopAbs_SOLID).More()) {
-        BRepBuilderAPI_Sewing sewing(1e-2);  // mm; gaps between the loose faces of CAD writers stay below
+        BRepBuilderAPI_Sewing sewing(sewing_tolerance(shape));
         sewing.Add(shape);
         sewing.Perform();
         if (!sewing.SewedShape().IsNull()) shape = solids_of_sewn(sewing.SewedShape());
       }
-      Mesh mesh = detail::mesh_of_shape(shape, options);
+      Mesh mesh = named_mesh(path, shape, options);
       mesh.name = std::filesystem::path(path).stem().string();
       if (!mesh.triangles.empty()) return mesh;
     }

@@ -15,10 +15,15 @@
 #include <cstdint>
 #include <unordered_map>
 
-#include "cad_exchange/torus_mesh.hpp"
+#include "cad_exchange/meshing.hpp"
+#include "tribin/cad/mend.hpp"
 
 namespace tribin::detail {
 namespace {
+
+// A twentieth of the chord error joins the two sides of an edge and is far below any edge that is meant to be there. A
+// surface that is that near to a cylinder is one.
+double recognition_tolerance(double chord_error_mm) { return chord_error_mm / 20; }
 
 // Chord error over the part's size: below it, a part of metres (or one whose unit is mistaken) would take millions of
 // triangles. 2e-5 leaves the default of 0.02 mm alone up to 1 m.
@@ -98,32 +103,23 @@ double signed_volume(const std::vector<Vec3>& points, const Mesh& mesh, std::siz
   return volume;
 }
 
-/// Faces of one solid, or of what lies outside of all solids.
-void add_faces(TopExp_Explorer faces, bool solid, Welder& welder, Mesh& mesh) {
-  const std::size_t first_triangle = mesh.triangles.size();
-  const std::size_t first_face = mesh.faces.size();
+/// Appends faces; the exact surface of one that has no triangle is kept, so that ids stay the order in the file.
+void add_faces(TopExp_Explorer faces, Welder& welder, Mesh& mesh) {
   for (; faces.More(); faces.Next()) {
     const int id = static_cast<int>(mesh.faces.size()) + 1;
     const TopoDS_Face& face = TopoDS::Face(faces.Current());
-    mesh.faces.push_back(exact_face(face, id, mesh.chord_error_mm / 20));
+    mesh.faces.push_back(exact_face(face, id, recognition_tolerance(mesh.chord_error_mm)));
     if (!add_face(face, id, welder, mesh))
       mesh.warnings.push_back("face " + std::to_string(id) + " could not be meshed and is left out");
   }
-  if (!solid) {
-    if (mesh.faces.size() > first_face) mesh.oriented = false;
-    return;
-  }
-  if (signed_volume(welder.points(), mesh, first_triangle) >= 0) return;
-  // A solid that is inside out: turn it, with what its faces say of their side.
-  for (std::size_t i = first_triangle; i < mesh.triangles.size(); ++i)
-    std::swap(mesh.triangles[i][1], mesh.triangles[i][2]);
-  for (std::size_t i = first_face; i < mesh.faces.size(); ++i) {
-    CadFace& f = mesh.faces[i];
-    if (f.type == SurfaceType::plane)
-      f.axis = -f.axis;
-    else if (f.type != SurfaceType::free_form)
-      f.concave = !f.concave;
-  }
+}
+
+/// Faces of one solid, outward.
+void add_solid(const TopoDS_Shape& solid, Welder& welder, Mesh& mesh) {
+  const std::size_t first = mesh.triangles.size();
+  add_faces(TopExp_Explorer(solid, TopAbs_FACE), welder, mesh);
+  if (signed_volume(welder.points(), mesh, first) >= 0) return;
+  for (std::size_t i = first; i < mesh.triangles.size(); ++i) std::swap(mesh.triangles[i][1], mesh.triangles[i][2]);
   mesh.warnings.push_back("a solid was inside out and has been turned");
 }
 
@@ -148,14 +144,17 @@ Mesh mesh_of_shape(const TopoDS_Shape& shape, const TessellationOptions& options
   mesher.ChangeParameters().Deflection = mesh.chord_error_mm;
   mesher.ChangeParameters().Angle = options.angle;
   mesher.ChangeParameters().InParallel = false;
-  mesher.Perform(mesh_context());
-  // A twentieth of the chord error joins the two sides of an edge and is far below any edge that is meant to be there.
-  Welder welder(mesh.chord_error_mm / 20);
+  mesher.Perform(mesh_context(recognition_tolerance(mesh.chord_error_mm)));
+  Welder welder(recognition_tolerance(mesh.chord_error_mm));
   for (TopExp_Explorer solids(shape, TopAbs_SOLID); solids.More(); solids.Next())
-    add_faces(TopExp_Explorer(solids.Current(), TopAbs_FACE), true, welder, mesh);
-  add_faces(TopExp_Explorer(shape, TopAbs_FACE, TopAbs_SOLID), false, welder, mesh);
+    add_solid(solids.Current(), welder, mesh);
+  const std::size_t of_solids = mesh.triangles.size();
+  add_faces(TopExp_Explorer(shape, TopAbs_FACE, TopAbs_SOLID), welder, mesh);
   mesh.vertices.reserve(welder.points().size());
   for (const Vec3& p : welder.points()) mesh.vertices.push_back(p.cast<float>());
+  // Faces outside of all solids say nothing sure of their side: the triangles' winding is mended as any mesh's.
+  if (mesh.triangles.size() > of_solids) mend_mesh(mesh);
+  take_sides_of_triangles(mesh);
   return mesh;
 }
 

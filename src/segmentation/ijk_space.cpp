@@ -107,18 +107,23 @@ void find_planes(Scene& scene, const Limits& limits, PlaneVoters voters, HoughSp
     double gathered = 0;
     for (int round = 0; round < 3; ++round) {
       Vec3 sum = Vec3::Zero();
-      members.clear();
-      gathered = 0;
-      for (std::uint32_t ring : bins.neighbours(bins.find(direction.cast<float>())))
-        for (std::uint32_t k = binned.begin[ring]; k < binned.begin[ring + 1]; ++k) {
-          const std::uint32_t i = binned.members[k];
-          const Vec3 n = s.normal[i].cast<double>();
-          const double dot = n.dot(direction);
-          if (!scene.free(i) || dead[i] || std::abs(dot) < std::cos(kPeakWidth)) continue;
-          members.push_back(i);
-          sum += n * (dot > 0 ? s.area_mm2[i] : -s.area_mm2[i]);
-          gathered += s.area_mm2[i];
-        }
+      const auto gather = [&](double width) {
+        members.clear();
+        gathered = 0;
+        for (std::uint32_t ring : bins.neighbours(bins.find(direction.cast<float>())))
+          for (std::uint32_t k = binned.begin[ring]; k < binned.begin[ring + 1]; ++k) {
+            const std::uint32_t i = binned.members[k];
+            const Vec3 n = s.normal[i].cast<double>();
+            const double dot = n.dot(direction);
+            if (!scene.free(i) || dead[i] || std::abs(dot) < std::cos(width)) continue;
+            members.push_back(i);
+            sum += n * (dot > 0 ? s.area_mm2[i] : -s.area_mm2[i]);
+            gathered += s.area_mm2[i];
+          }
+      };
+      gather(kPeakWidth);
+      // Exact normals all vote in one bin: then the peak may be any bin of its ring, further off than the width.
+      if (members.empty() && round == 0) gather(0.5 * kPi);
       if (members.empty()) break;
       direction = sum.normalized();
     }

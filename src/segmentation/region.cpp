@@ -128,11 +128,23 @@ double residual_correlation(Scene& scene, std::span<const std::uint32_t> support
   return squares > 0 ? products / squares : 0;
 }
 
+namespace {
+
+/// On a mesh a cylinder may be tangent to its fillets; a piece of a torus goes on as it is.
+bool bends_alike(const Surfels& s, std::uint32_t i, std::uint32_t j) {
+  const float a = s.curvature1[i], b = s.curvature1[j];
+  return a * b > 0 && std::abs(a) < 1.4f * std::abs(b) && std::abs(b) < 1.4f * std::abs(a) &&
+         std::abs(s.direction2[i].dot(s.direction2[j])) > 0.9f;
+}
+
+}  // namespace
+
 double smooth_rim_share(Scene& scene, std::span<const std::uint32_t> support) {
   const Surfels& s = scene.surfels;
   const std::uint32_t inside = ++scene.tick;
   for (std::uint32_t i : support) scene.mark[i] = inside;
   std::size_t rim = 0, smooth = 0;
+  const int least = s.mesh != nullptr ? 1 : 2;                            // of up to 8 neighbours; a triangle has 3
   const float cos_smooth = static_cast<float>(std::cos(12.0 * kDegree));  // a cell of width w bends by w / R
   for (std::uint32_t i : support) {
     int neighbours = 0, outside_free = 0, outside = 0;
@@ -141,11 +153,12 @@ double smooth_rim_share(Scene& scene, std::span<const std::uint32_t> support) {
       ++neighbours;
       if (scene.mark[j] == inside) continue;
       ++outside;
-      outside_free += scene.free(j) && s.normal[i].dot(s.normal[j]) > cos_smooth;
+      outside_free +=
+          scene.free(j) && (s.mesh != nullptr ? bends_alike(s, i, j) : s.normal[i].dot(s.normal[j]) > cos_smooth);
     }
     if (outside == 0 && (neighbours == 8 || s.scan == nullptr)) continue;
     ++rim;
-    smooth += outside_free >= 2;
+    smooth += outside_free >= least;
   }
   return rim > 0 ? static_cast<double>(smooth) / static_cast<double>(rim) : 0;
 }

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "segmentation/mesh_pieces.hpp"
 #include "segmentation/spaces.hpp"
 
 namespace tribin::segmentation_detail {
@@ -221,8 +222,14 @@ void find_cones_and_spheres(Scene& scene, const Limits& limits, std::vector<Foun
   for (SurfelShape shape : {SurfelShape::ruled, SurfelShape::curved}) {
     Indices members;
     for (std::uint32_t i = 0; i < s.size(); ++i)
-      if (scene.free(i) && s.shape[i] == shape) members.push_back(i);
-    for (const Indices& component : components(scene, members, least)) {
+      // On a narrow band of facets which of the two a facet is cannot be told from its neighbours.
+      if (scene.free(i) && (s.mesh != nullptr ? s.shape[i] != SurfelShape::flat : s.shape[i] == shape))
+        members.push_back(i);
+    std::vector<Indices> pieces = components(scene, members, least);
+    if (s.mesh != nullptr) add_neighbourhoods(scene, pieces);
+    for (Indices& component : pieces) {
+      std::erase_if(component, [&](std::uint32_t i) { return !scene.free(i); });
+      if (component.size() < least) continue;
       const bool sphere = shape == SurfelShape::curved;
       const Surface start = sphere ? sphere_from_normals(s, component) : cone_from_normals(s, component);
       if (!(start.radius > 0) || start.radius > limits.max_radius_mm) continue;
@@ -233,6 +240,8 @@ void find_cones_and_spheres(Scene& scene, const Limits& limits, std::vector<Foun
       std::optional<FoundSurface> c = settle(scene, component, start, options, limits);
       if (!c) continue;
       if (std::abs(c->fit.surface.half_angle) > 80 * kDegree) continue;  // a dented plane
+      if (!sphere && !tapers(c->fit)) continue;                          // a cylinder: find_cylinders' to take
+      if (sphere && s.mesh != nullptr && is_ring(s, c->support)) continue;
       const double arc = arc_of(s, c->support, c->fit.surface);
       if (!sphere && !accepted(scene, component, *c, arc, limits)) continue;
       if (sphere &&
