@@ -8,6 +8,7 @@
 #include "tribin/core/error.hpp"
 #include "tribin/core/log.hpp"
 #include "tribin/finder/finder.hpp"
+#include "tribin/report/figures.hpp"
 #include "tribin/report/json.hpp"
 #include "tribin/report/report.hpp"
 #include "tribin/report/summary.hpp"
@@ -16,7 +17,7 @@ namespace tribin::cli {
 namespace {
 
 struct Options {
-  std::string scan, camera, json, report, truth, unit = "mm", scan_unit = "auto", method = "surfel";
+  std::string scan, camera, json, report, figures, truth, unit = "mm", scan_unit = "auto", method = "surfel";
   std::vector<std::string> parts;
   double tolerance_mm = 0, tolerance_deg = 0;
   int time_limit_ms = 0;
@@ -116,6 +117,11 @@ int run(Options options, const Context& context) {
     write_locate_report(staged.path(), scan, parts, found, report, truth);
     staged.publish();
   }
+  if (!options.figures.empty()) {
+    StagedOutput staged(options.figures);
+    write_paper_figures(staged.path(), scan, parts, found);
+    staged.publish();
+  }
   if (options.json != "-") {
     print_table(scan, parts, found, truth);
     if (!options.no_times) print_times(found.times);
@@ -160,6 +166,7 @@ void add_locate(CLI::App& app, Context& context) {
       ->type_name("FILE");
   command->add_flag("--no-times", options->no_times, "Leave the times out: same input, same bytes");
   add_no_cache(command, options->no_cache);
+  only_experts(command->add_option("--figures", options->figures), context);
   only_experts(command->add_option("--cell-px", options->finder.surfel.cell_px), context);
   only_experts(command->add_option("--max-radius-mm", options->finder.surfel.max_radius_mm), context);
   only_experts(command->add_option("--min-area-mm2", options->finder.segmentation.min_area_mm2), context);

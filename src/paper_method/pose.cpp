@@ -28,7 +28,7 @@ TestResult axis_offset(const Primitive& main, const Primitive& sub) {
   const double reach = (middle_of(sub) - middle_of(main)).dot(main.axis);
   const double tilt = main.covariance(0, 0) + main.covariance(1, 1);
   TestResult test{"axis_offset", across(middle_of(main), middle_of(sub), main.axis).norm(),
-                  3 * std::sqrt(place + reach * reach * tilt), false};
+                  3 * std::sqrt(place + reach * reach * tilt), false, true};
   // Castings are coaxial within a hundredth of their size, not within the noise of a scan.
   test.limit = std::max(test.limit, 0.02 * main.radius_mm);
   test.passed = test.value > test.limit;

@@ -11,7 +11,7 @@ namespace {
 constexpr double kMaxTurnDeg = 3;  // a short strip holds its axis no better; see docs/segmentation.md
 
 TestResult at_most(const char* test, double value, double limit) { return {test, value, limit, value <= limit}; }
-TestResult at_least(const char* test, double value, double limit) { return {test, value, limit, value >= limit}; }
+TestResult at_least(const char* test, double value, double limit) { return {test, value, limit, value >= limit, true}; }
 
 double angle_deg(const Vec3& a, const Vec3& b) { return std::acos(std::clamp(a.dot(b), -1.0, 1.0)) / kDegree; }
 

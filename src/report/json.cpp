@@ -27,6 +27,7 @@ Json evidence_json(const Evidence& e) {
     out["tests"].push_back({{"test", test.test},
                             {"value", json::significant(test.value)},
                             {"limit", json::significant(test.limit)},
+                            {"wanted", test.at_least ? "at_least" : "at_most"},
                             {"passed", test.passed}});
   return out;
 }

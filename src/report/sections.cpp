@@ -120,7 +120,7 @@ int digits_of(const TestResult& test) {
 
 /// What differs from its nominal value by more than 3 sigma: how many, and the worst.
 struct Beyond {
-  int count = 0;
+  int count = 0, of = 0;
   double sigmas = 0;
   std::string primitive;
   double by_mm = 0;
@@ -135,9 +135,11 @@ std::string evidence_row(const Evidence& e, Beyond& beyond) {
   if (nominal && measured && sigma && *sigma > 0) {
     const int decimals = std::max(2, decimals_for(*sigma));
     const double off = (*measured - *nominal) / *sigma;
+    ++beyond.of;
     if (std::abs(off) > 3) ++beyond.count;
     if (std::abs(off) > 3 && std::abs(off) > std::abs(beyond.sigmas))
-      beyond = {beyond.count, off, e.primitive, *measured - *nominal, static_cast<bool>(e.radius_nominal_mm)};
+      beyond = {
+          beyond.count, beyond.of, off, e.primitive, *measured - *nominal, static_cast<bool>(e.radius_nominal_mm)};
     out += cell(number(*nominal, 2)) + cell(number(*measured, decimals)) + cell(number(*sigma, decimals + 1)) + "<td>" +
            sigma_rail(off) + "</td>";
   } else {
@@ -151,7 +153,7 @@ std::string evidence_row(const Evidence& e, Beyond& beyond) {
     std::string words = test.test;
     std::replace(words.begin(), words.end(), '_', ' ');
     out += "<span class=\"test\">" + escaped(words) + " <b>" + number(test.value, digits_of(test)) + "</b> " +
-           (test.value <= test.limit ? "≤ " : "≥ ") + number(test.limit, digits_of(test)) + "</span>";
+           (test.at_least ? "≥ " : "≤ ") + number(test.limit, digits_of(test)) + "</span>";
   }
   return out + "</td></tr>";
 }
@@ -165,7 +167,6 @@ std::string evidence_section(std::span<const Part> parts, const Found& found) {
               "the normal. Ticks mark 3 σ.");
   constexpr std::size_t kOpen = 10, kMost = 12;  // a page, not a data base: the JSON has them all
   std::string tables;
-  int rows = 0;
   Beyond beyond;
   for (std::size_t i = 0; i < found.instances.items.size() && i < kMost; ++i) {
     const Instance& instance = found.instances.items[i];
@@ -179,19 +180,19 @@ std::string evidence_section(std::span<const Part> parts, const Found& found) {
       if (k == kOpen && instance.evidence.size() > kOpen + 2)
         tables += std::string(kTail) + "<details><summary>" + std::to_string(instance.evidence.size() - kOpen) +
                   " smaller ones</summary>" + head(columns, 1);
-      tables += evidence_row(instance.evidence[k], beyond), ++rows;
+      tables += evidence_row(instance.evidence[k], beyond);
     }
     tables += std::string(kTail) + (instance.evidence.size() > kOpen + 2 ? "</details>" : "") + "</div>";
   }
   if (found.instances.items.empty()) tables = "<p>There is none: no part is given out.</p>";
   if (beyond.count > 0)
-    out += "<p>" + std::to_string(beyond.count) + " of " + std::to_string(rows) +
+    out += "<p>" + std::to_string(beyond.count) + " of " + std::to_string(beyond.of) +
            " differ from the CAD by more than 3 σ; most of all " + escaped(beyond.primitive) + ", " +
            number(std::abs(beyond.by_mm), 3) + " mm " +
            (beyond.radius ? (beyond.by_mm > 0 ? "larger in radius" : "smaller in radius") : "off its place") + " (" +
            number(std::abs(beyond.sigmas), 1) + " σ).</p>";
-  else if (rows > 0)
-    out += "<p>All " + std::to_string(rows) + " agree with the CAD within 3 σ.</p>";
+  else if (beyond.of > 0)
+    out += "<p>All " + std::to_string(beyond.of) + " agree with the CAD within 3 σ.</p>";
   if (found.instances.items.size() > kMost)
     out += "<p>The best " + std::to_string(kMost) + " instances; report.json has all.</p>";
   return out + "<div class=\"two\">" + tables + "</div></section>\n";

@@ -12,6 +12,7 @@ import subprocess
 import sys
 import time
 import unittest
+import xml.etree.ElementTree
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 DATA = pathlib.Path(os.environ.get("TRIBIN_DATA", ROOT / "../shared/data"))
@@ -152,6 +153,21 @@ class LocateCommand(unittest.TestCase):
         for forbidden in ("http://", "https://", "<script"):
             self.assertNotIn(forbidden, page)
         validated(self, "locate", (dir / "report.json").read_text())
+
+    def test_the_papers_method_says_what_each_candidate_was_judged_by(self):
+        figures = WORK / "figures"
+        shutil.rmtree(figures, ignore_errors=True)
+        out = run(*self.arguments, "--method", "paper", "--json", "-")
+        self.assertIn(out.returncode, (0, 1), out.stderr)
+        result = validated(self, "locate", out.stdout)
+        self.assertTrue(result["rejected"] or result["instances"])
+        for instance in result["instances"]:
+            self.assertTrue(all(e["tests"] for e in instance["evidence"]))
+        drawn = run(*self.arguments, "--method", "paper", "--expert", "--figures", figures)
+        with_plane = [i for i in result["instances"] if any(e["type"] == "plane" for e in i["evidence"])]
+        self.assertEqual(drawn.returncode, 0 if with_plane else 4, drawn.stderr)
+        for figure in sorted(figures.glob("*")) if with_plane else []:
+            xml.etree.ElementTree.parse(figure)
 
     def test_a_file_is_there_whole_or_not_at_all_after_an_interrupt(self):
         target = WORK / "interrupted"

@@ -30,6 +30,7 @@ struct TestResult {
   double value = 0;
   double limit = 0;
   bool passed = false;
+  bool at_least = false;  ///< the limit is the least that was wanted, not the most
 };
 
 /// One primitive of the part, measured in the scan without its nominal value.
