@@ -25,8 +25,10 @@ std::vector<CircleMark> circles(const Primitives& primitives, const Sighting& wh
   std::vector<CircleMark> out;
   for (int k : where.primitives) {
     const Primitive& p = primitives.items[k];
-    if (out.size() >= most || (p.type != PrimitiveType::cylinder && p.type != PrimitiveType::cone)) continue;
+    if (p.type != PrimitiveType::cylinder && p.type != PrimitiveType::cone) continue;
     const bool cone = p.type == PrimitiveType::cone;
+    const auto alike = [&](const CircleMark& m) { return m.type == name_of(p.type); };
+    if (static_cast<std::size_t>(std::count_if(out.begin(), out.end(), alike)) >= most) continue;
     const CircleMark mark{p.axis, cone ? (p.concave ? 1 : -1) * std::sin(p.half_angle) : 0, "C" + std::to_string(p.id),
                           name_of(p.type)};
     const auto same = std::find_if(out.begin(), out.end(), [&](const CircleMark& m) {
@@ -53,7 +55,7 @@ SpaceArt space_art(const Observation& seen, const Sighting& where) {
   out.all = sphere_svg(all, {}, {}, "Half sphere of all normals");
   out.flat =
       sphere_svg(flat, marks(seen.primitives, where, PrimitiveType::plane, 5), {}, "Half sphere of flat surfels");
-  out.curved = sphere_svg(curved, {}, circles(seen.primitives, where, 3), "Half sphere of curved surfels");
+  out.curved = sphere_svg(curved, {}, circles(seen.primitives, where, 2), "Half sphere of curved surfels");
   out.votes = disc_svg(seen.primitives.spaces.parameter, marks(seen.primitives, where, PrimitiveType::cylinder, 5),
                        "Equal-area disc of axis votes");
   return out;
