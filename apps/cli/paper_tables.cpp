@@ -179,8 +179,8 @@ std::string paper_method_summary(const std::vector<PaperRun>& runs) {
               eval::quantile(mm, 0.5), eval::quantile(mm, 0.95), eval::quantile(deg, 0.5), eval::quantile(deg, 0.95));
   out += line("  recognition and pose: median %.0f ms", eval::quantile(ms, 0.5));
   for (const auto& [test, times] : refused)
-    out += line("  no answer in %d: the furthest candidates fell to %s", times,
-                test.empty() ? "no cylinder being seen" : test.c_str());
+    out += line("  no answer in %d: %s", times,
+                test.empty() ? "no cylinder is seen" : ("the furthest candidates fell to " + test).c_str());
   return out;
 }
 
