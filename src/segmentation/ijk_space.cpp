@@ -137,8 +137,10 @@ void find_planes(Scene& scene, const Limits& limits, PlaneVoters voters, HoughSp
     bool any = false;
     for (int side = 0; side < 2; ++side) {
       Indices one_side;
-      for (std::uint32_t i : members)
-        if ((s.normal[i].cast<double>().dot(direction) > 0) == (side == 0)) one_side.push_back(i);
+      for (std::uint32_t i : members) {
+        const bool front = !s.oriented || s.normal[i].cast<double>().dot(direction) > 0;
+        if (front == (side == 0)) one_side.push_back(i);
+      }
       std::sort(one_side.begin(), one_side.end());
       for (const Indices& component : components(scene, one_side, least)) {
         Indices left = component;

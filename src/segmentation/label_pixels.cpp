@@ -75,4 +75,12 @@ Image<std::uint16_t> label_pixels(const Primitives& primitives, const Surfels& s
   return labels;
 }
 
+std::vector<std::uint16_t> label_points(const Primitives& primitives, const Surfels& surfels) {
+  TRIBIN_ASSERT(surfels.point_set != nullptr);
+  std::vector<std::uint16_t> out(surfels.surfel_of_point.size());
+  for (std::size_t i = 0; i < out.size(); ++i)
+    out[i] = static_cast<std::uint16_t>(primitives.label_of_surfel[surfels.surfel_of_point[i]]);
+  return out;
+}
+
 }  // namespace tribin

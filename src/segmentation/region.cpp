@@ -77,10 +77,12 @@ std::vector<Indices> components(Scene& scene, std::span<const std::uint32_t> mem
 bool fits(const Surfels& s, std::uint32_t i, const Surface& surface, double scale, double slack) {
   const Vec3 p = s.position[i].cast<double>();
   if (std::abs(misfit(s, i, surface)) > 4.0 * scale * s.sigma_mm[i]) return false;
+  if (s.sigma_normal[i] >= 1) return true;  // no normal: loose points beside edges
   const double limit = std::min(4.0 * scale * s.sigma_normal[i] + slack, 60.0 * kDegree);
   // 1 - x^2 / 2 + x^4 / 24 is the cosine to 1e-3 up to 60 deg, without a call per surfel.
   const double x2 = limit * limit;
-  return surface.normal(p).dot(s.normal[i].cast<double>()) > 1.0 - x2 * (0.5 - x2 / 24.0);
+  const double agree = surface.normal(p).dot(s.normal[i].cast<double>());
+  return (s.oriented ? agree : std::abs(agree)) > 1.0 - x2 * (0.5 - x2 / 24.0);
 }
 
 Indices grow(Scene& scene, const Surface& surface, std::span<const std::uint32_t> seed, double scale, double slack) {

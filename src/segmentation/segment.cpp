@@ -4,6 +4,7 @@
 
 #include "segmentation/boundary.hpp"
 #include "segmentation/cad_faces.hpp"
+#include "segmentation/loose_points.hpp"
 #include "segmentation/spaces.hpp"
 #include "tribin/core/error.hpp"
 #include "tribin/core/parallel.hpp"
@@ -15,7 +16,8 @@ namespace {
 using namespace segmentation_detail;
 
 Limits limits_of(const Surfels& surfels, const Scene& scene, const SegmentationOptions& options) {
-  constexpr std::size_t kCells = 30;  // the least that holds a plane's or a cylinder's direction
+  // The least that holds a plane's or a cylinder's direction; loose points have the whole of a cell's say each.
+  const double kCells = surfels.point_set != nullptr ? 10 : 30;
   Limits limits;
   limits.radii_mm = options.radii_mm;
   for (double radius : limits.radii_mm)
@@ -110,6 +112,25 @@ const char* name_of(PrimitiveType type) {
   return kNames[static_cast<int>(type)];
 }
 
+void segmentation_detail::explain(Scene& scene, const Limits& limits, HoughSpaces& spaces,
+                                  std::vector<FoundSurface>& found) {
+  const Surfels& surfels = scene.surfels;
+  // Back and forth among the spaces on what is left, until a round explains nothing more.
+  constexpr int kRounds = 2;
+  for (int round = 0; round < kRounds; ++round) {
+    const std::size_t before = found.size();
+    find_planes(scene, limits, PlaneVoters::flat, spaces, found);
+    // Flat cones of a CAD file would pass as cylinders of large radius; exact vertices let cones go first.
+    if (surfels.mesh != nullptr) find_cones_and_spheres(scene, limits, found);
+    find_cylinders(scene, limits, spaces, found);
+    if (surfels.mesh == nullptr) {
+      find_planes(scene, limits, PlaneVoters::flat_and_undecided, spaces, found);
+      find_cones_and_spheres(scene, limits, found);
+    }
+    if (found.size() == before) break;
+  }
+}
+
 Primitives segment(const Surfels& surfels, const SegmentationOptions& options) {
   Primitives out;
   Scene scene(surfels);
@@ -119,20 +140,8 @@ Primitives segment(const Surfels& surfels, const SegmentationOptions& options) {
   std::vector<FoundSurface> found;
   if (surfels.mesh != nullptr) take_cad_faces(scene, found);
 
-  // Back and forth among the spaces on what is left, until a round explains nothing more.
-  constexpr int kRounds = 2;
-  for (int round = 0; round < kRounds; ++round) {
-    const std::size_t before = found.size();
-    find_planes(scene, limits, PlaneVoters::flat, out.spaces, found);
-    // Flat cones of a CAD file would pass as cylinders of large radius; exact vertices let cones go first.
-    if (surfels.mesh != nullptr) find_cones_and_spheres(scene, limits, found);
-    find_cylinders(scene, limits, out.spaces, found);
-    if (surfels.mesh == nullptr) {
-      find_planes(scene, limits, PlaneVoters::flat_and_undecided, out.spaces, found);
-      find_cones_and_spheres(scene, limits, found);
-    }
-    if (found.size() == before) break;
-  }
+  explain(scene, limits, out.spaces, found);
+  if (surfels.point_set != nullptr) explain_rest(scene, limits, out.spaces, found);
 
   if (surfels.mesh == nullptr) {
     find_by_great_circles(scene, limits, out.spaces, found);
@@ -143,6 +152,7 @@ Primitives segment(const Surfels& surfels, const SegmentationOptions& options) {
   for (FoundSurface& f : found) f.support.clear();
   for (std::uint32_t i = 0; i < scene.label.size(); ++i)
     if (scene.label[i] > 0) found[static_cast<std::size_t>(scene.label[i] - 1)].support.push_back(i);
+  std::erase_if(found, [](const FoundSurface& f) { return f.support.empty(); });
   out.items.resize(found.size());
   parallel_each(static_cast<int>(found.size()), [&](int i) {
     FoundSurface& f = found[static_cast<std::size_t>(i)];

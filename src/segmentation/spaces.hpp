@@ -68,6 +68,9 @@ bool tapers(const Fit& cone);
 /// Arc of the support about the surface's axis [rad]: the circle less its largest gap.
 double arc_of(const Surfels& surfels, const Indices& support, const Surface& surface);
 
+/// Back and forth among the spaces on what is left, until a round explains nothing more.
+void explain(Scene& scene, const Limits& limits, HoughSpaces& spaces, std::vector<FoundSurface>& found);
+
 /// Takes the support: labels it with the number that `found` will have.
 void take(Scene& scene, std::vector<FoundSurface>& found, FoundSurface&& next);
 

@@ -6,6 +6,7 @@
 #include "surfel/cell_grid.hpp"
 #include "surfel/cell_noise.hpp"
 #include "surfel/quadrics.hpp"
+#include "surfel/shape.hpp"
 #include "tribin/core/error.hpp"
 #include "tribin/core/parallel.hpp"
 #include "tribin/surfel/surfels.hpp"
@@ -179,20 +180,6 @@ Curvature curvature_of(const Vec3& ray, double w, double wx, double wy, const do
   return k;
 }
 
-SurfelShape shape_of(const Curvature& k, float max_radius_mm) {
-  if (std::abs(k.k1) > 3.0 * k.sigma) {
-    // Curved for sure. Ruled if the other curvature is within its own noise or small beside the first.
-    const double second = std::abs(k.k2);
-    if (second < std::max(3.0 * k.sigma, 0.15 * std::abs(k.k1)) && second < 0.5 * std::abs(k.k1)) {
-      if (std::abs(k.k1) * max_radius_mm > 0.5) return SurfelShape::ruled;
-      return SurfelShape::flat;  // proven to be of a larger radius than any that matters
-    }
-    return std::abs(k.k1) * max_radius_mm > 0.5 ? SurfelShape::curved : SurfelShape::flat;
-  }
-  // Flat only where a cylinder of the largest radius would have shown: algorithms.md section 15.
-  return 3.2 * k.sigma < 0.7 / max_radius_mm ? SurfelShape::flat : SurfelShape::unknown;
-}
-
 void fill_surfel(Surfels& s, std::size_t index, const Scan& scan, const CellGrid& grid, const Quadrics& quadrics,
                  float sigma_d, const CellNoise& noise, double noise_inflation, float max_radius_mm) {
   const std::size_t cell = s.cell[index];
@@ -242,7 +229,7 @@ void fill_surfel(Surfels& s, std::size_t index, const Scan& scan, const CellGrid
   s.curvature2[index] = static_cast<float>(k.k2);
   s.sigma_curvature[index] = static_cast<float>(k.sigma);
   s.direction2[index] = k.direction2.cast<float>();
-  s.shape[index] = shape_of(k, max_radius_mm);
+  s.shape[index] = shape_of(k.k1, k.k2, k.sigma, max_radius_mm);
 }
 
 /// 8-neighbours whose planes meet half way. Tangent planes of one smooth surface agree there whatever its curvature, so

@@ -95,6 +95,9 @@ Primitives segment(const Surfels& surfels, const SegmentationOptions& options = 
 /// Primitive id of each pixel (0 = none): the surfels' labels carried to the pixels within 3 local sigma.
 Image<std::uint16_t> label_pixels(const Primitives& primitives, const Surfels& surfels);
 
+/// Primitive id of each loose point in the input's order (0 = none).
+std::vector<std::uint16_t> label_points(const Primitives& primitives, const Surfels& surfels);
+
 /// Bin centres on the half sphere z >= 0 by the golden-section spiral.
 std::vector<Vec3f> golden_spiral(int bins);
 

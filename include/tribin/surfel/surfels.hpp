@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "tribin/cad/mesh.hpp"
@@ -35,6 +36,11 @@ struct Surfels {
   const PointSet* point_set = nullptr;
   const Mesh* mesh = nullptr;
 
+  /// Normals have one side on the whole of the surface: towards the camera or outward. Without a viewpoint loose points
+  /// have one side on each smooth patch only.
+  bool oriented = true;
+  std::vector<std::uint32_t> surfel_of_point;  ///< points: per raw point; duplicates and crowds share a surfel
+
   int cell_px = 0;                     ///< scan: side of a cell [px]
   Image<std::int32_t> surfel_of_cell;  ///< scan: grid of cells, -1 = none
   std::vector<std::uint32_t> cell;     ///< scan: row-major index of the surfel's cell
@@ -53,6 +59,17 @@ struct SurfelOptions {
 /// Cuts a scan into cells and fits each a plane in inverse depth, then a quadric over windows of cells.
 /// \throws Error too_little_data when fewer than 100 pixels are valid.
 Surfels surfels_from_scan(const Scan& scan, const SurfelOptions& options = {});
+
+/// One surfel per point, from the smallest neighbourhood whose normal and curvature the noise lets decide; clouds of more
+/// than 200,000 points are thinned to means first. Without a viewpoint normals point outward as far as neighbours tell.
+/// \param options  max_radius_mm counts only as far as the cloud's diagonal.
+/// \throws Error  too_little_data for fewer than 30 points.
+/// \cost          50,000 points 0.5 s, 1,000,000 points 3 s (2 cores).
+Surfels surfels_from_points(const PointSet& points, const SurfelOptions& options = {});
+
+/// The surfels of loose points again, fitted to some of them only: neighbourhoods no longer reach into what is
+/// explained. Entry k belongs to members[k]; the noise is that of `all`.
+Surfels surfels_among(const Surfels& all, std::span<const std::uint32_t> members);
 
 /// One surfel per triangle; curvature from the dihedral angles of smooth neighbours.
 Surfels surfels_from_mesh(const Mesh& mesh);
