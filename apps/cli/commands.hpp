@@ -53,6 +53,12 @@ void add_no_cache(CLI::App* command, bool& no_cache);
 std::vector<Part> read_parts(const std::vector<PartArgument>& arguments, const std::string& unit,
                              bool no_cache = false);
 
+/// Reads an organized scan or loose points and logs the warnings.
+ScanOrPoints read_scan_or_points_logged(const std::filesystem::path& file, const std::string& camera,
+                                        const std::string& unit);
+/// The surfels of either; the input must outlive them.
+Surfels surfels_of(const ScanOrPoints& input, const SurfelOptions& options);
+
 /// Reads an organized scan and logs its warnings.
 Scan read_scan_logged(const std::filesystem::path& scan, const std::string& camera, const std::string& unit);
 

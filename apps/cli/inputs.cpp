@@ -73,4 +73,21 @@ Scan read_scan_logged(const std::filesystem::path& file, const std::string& came
   return scan;
 }
 
+ScanOrPoints read_scan_or_points_logged(const std::filesystem::path& file, const std::string& camera,
+                                        const std::string& unit) {
+  ScanOrPoints input = read_scan_or_points(file, {.camera_file = camera, .unit = length_unit_from_name(unit)});
+  std::visit(
+      [&](const auto& read) {
+        for (const std::string& warning : read.warnings)
+          log(LogLevel::warning, file.filename().string() + ": " + warning);
+      },
+      input);
+  return input;
+}
+
+Surfels surfels_of(const ScanOrPoints& input, const SurfelOptions& options) {
+  if (const auto* scan = std::get_if<Scan>(&input)) return surfels_from_scan(*scan, options);
+  return surfels_from_points(std::get<PointSet>(input), options);
+}
+
 }  // namespace tribin::cli

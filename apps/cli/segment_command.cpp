@@ -1,4 +1,5 @@
 #include <cstdio>
+#include <fstream>
 
 #include "commands.hpp"
 #include "output.hpp"
@@ -29,17 +30,36 @@ void print_table(const Primitives& primitives) {
   }
 }
 
+/// Primitive ids: of a grid as a picture, or as text, one id a line in the input's order.
+void write_labels(const std::string& file, const Primitives& primitives, const Surfels& surfels) {
+  const bool text = std::filesystem::path(file).extension() == ".txt";
+  if (!text && surfels.scan == nullptr)
+    throw Error(ErrorCode::bad_option, "--labels " + file + ": loose points have no picture; wanted a name in .txt");
+  StagedOutput staged(file);
+  if (text) {
+    std::ofstream out(staged.path());
+    for (std::uint16_t id :
+         surfels.scan != nullptr ? label_pixels(primitives, surfels).data : label_points(primitives, surfels))
+      out << id << '\n';
+    out.close();
+    if (!out) throw Error(ErrorCode::bad_option, file + ": cannot be written (is the disk full?)");
+  } else {
+    write_label_png(staged.path(), label_pixels(primitives, surfels));
+  }
+  staged.publish();
+}
+
 int run(const Options& options, const Context& context) {
   StageTimes times;
-  Scan scan;
+  ScanOrPoints input;
   {
     const StageTimer timer(times, "read");
-    scan = read_scan_logged(options.scan, options.camera, options.scan_unit);
+    input = read_scan_or_points_logged(options.scan, options.camera, options.scan_unit);
   }
   Surfels surfels;
   {
     const StageTimer timer(times, "surface_normals");
-    surfels = surfels_from_scan(scan, options.surfel);
+    surfels = surfels_of(input, options.surfel);
   }
   Primitives primitives;
   {
@@ -53,15 +73,11 @@ int run(const Options& options, const Context& context) {
   }
   const bool with_times = !options.no_times;
   if (!options.json.empty())
-    write_text(options.json, segment_json(scan, surfels, primitives, model, times, {}, {.times = with_times}));
-  if (!options.labels.empty()) {
-    StagedOutput staged(options.labels);
-    write_label_png(staged.path(), label_pixels(primitives, surfels));
-    staged.publish();
-  }
+    write_text(options.json, segment_json(surfels, primitives, model, times, {}, {.times = with_times}));
+  if (!options.labels.empty()) write_labels(options.labels, primitives, surfels);
   if (!options.report.empty()) {
     StagedOutput staged(options.report);
-    write_segment_report(staged.path(), scan, surfels, primitives, model, times, {},
+    write_segment_report(staged.path(), surfels, primitives, model, times, {},
                          {context.command, {options.scan}, context.threads, with_times});
     staged.publish();
   }
@@ -73,9 +89,13 @@ int run(const Options& options, const Context& context) {
 
 void add_segment(CLI::App& app, Context& context) {
   auto options = std::make_shared<Options>();
-  CLI::App* command = add_command(app, context, "segment", "Find the planes, cylinders, cones and spheres of a scan",
-                                  "tribin segment bin.pcd --radii 65,28 --json primitives.json --labels labels.png");
-  command->add_option("SCAN", options->scan, "Scan: PCD, PLY, depth PNG or TIFF with camera.json, NPY")->required();
+  CLI::App* command =
+      add_command(app, context, "segment", "Find the planes, cylinders, cones and spheres of a scan or of loose points",
+                  "tribin segment bin.pcd --radii 65,28 --json primitives.json --labels labels.png");
+  command
+      ->add_option("SCAN", options->scan,
+                   "Scan: PCD, PLY, depth PNG or TIFF with camera.json, NPY; loose points too, also XYZ")
+      ->required();
   command->add_option("--camera", options->camera, "Camera file of a depth image")->type_name("FILE");
   command->add_option("--radii", options->radii_mm, "Radii to expect [mm], with commas")
       ->delimiter(',')
@@ -83,8 +103,10 @@ void add_segment(CLI::App& app, Context& context) {
       ->type_name("R,R,...");
   command->add_option("--scan-unit", options->scan_unit, "Unit of clouds: mm, m, auto")->type_name("U");
   command->add_option("--json", options->json, "Write the result as JSON; - is stdout")->type_name("OUT|-");
-  command->add_option("--labels", options->labels, "Write the primitive id of each pixel as 16-bit PNG, 0 = none")
-      ->type_name("FILE.png");
+  command
+      ->add_option("--labels", options->labels,
+                   "Write the primitive id of each pixel or point, 0 = none: 16-bit PNG, or text, one a line")
+      ->type_name("FILE.png|.txt");
   command->add_option("--report", options->report, "Write a page with pictures and tables")->type_name("DIR");
   command->add_flag("--no-times", options->no_times, "Leave the times out: same input, same bytes");
   only_experts(command->add_option("--cell-px", options->surfel.cell_px), context);

@@ -103,18 +103,18 @@ std::string locate_json(const Scan& scan, const Found& found, const JsonOptions&
   return json::text_of(out);
 }
 
-std::string segment_json(const Scan& scan, const Surfels& surfels, const Primitives& primitives,
-                         const PrimitiveModel& model, const StageTimes& times, const std::vector<Warning>& warnings,
-                         const JsonOptions& options) {
+std::string segment_json(const Surfels& surfels, const Primitives& primitives, const PrimitiveModel& model,
+                         const StageTimes& times, const std::vector<Warning>& warnings, const JsonOptions& options) {
+  const Pose frame = surfels.scan != nullptr ? surfels.scan->input_from_camera : Pose::Identity();
   Json out = json::head();
-  out["scan"] = json::scan_summary(scan, &surfels);
+  out["scan"] = surfels.scan != nullptr ? json::scan_summary(*surfels.scan, &surfels) : json::cloud_summary(surfels);
   out["primitives"] = Json::array();
   for (const Primitive& primitive : primitives.items)
-    out["primitives"].push_back(json::primitive(json::moved(primitive, scan.input_from_camera), &primitives.spaces));
+    out["primitives"].push_back(json::primitive(json::moved(primitive, frame), &primitives.spaces));
   out["relations"] = Json::array();
-  for (const Relation& relation : model.relations)
-    out["relations"].push_back(json::relation(relation, scan.input_from_camera));
-  out["warnings"] = json::warnings(warnings, scan.warnings);
+  for (const Relation& relation : model.relations) out["relations"].push_back(json::relation(relation, frame));
+  out["warnings"] =
+      json::warnings(warnings, surfels.scan != nullptr ? surfels.scan->warnings : surfels.point_set->warnings);
   if (options.times) out["stages_ms"] = json::stages(times);
   return json::text_of(out);
 }

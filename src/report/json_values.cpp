@@ -88,6 +88,17 @@ Json scan_summary(const Scan& scan, const Surfels* surfels) {
           {"noise_mm", rounded(noise_mm, 4)}};
 }
 
+Json cloud_summary(const Surfels& surfels) {
+  std::vector<float> sigma(surfels.sigma_mm);
+  std::nth_element(sigma.begin(), sigma.begin() + static_cast<std::ptrdiff_t>(sigma.size() / 2), sigma.end());
+  const std::size_t points = surfels.point_set->points.size();
+  return {{"file", std::filesystem::path(surfels.point_set->source).filename().string()},
+          {"width", points},
+          {"height", 1},
+          {"valid_points", points},
+          {"noise_mm", rounded(sigma[sigma.size() / 2], 4)}};
+}
+
 Json stages(const StageTimes& times) {
   Json out = Json::object();
   for (const auto& [stage, ms] : times.stages_ms) out[stage] = rounded(ms, 2);

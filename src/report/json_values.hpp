@@ -31,6 +31,8 @@ Primitive moved(const Primitive& primitive, const Pose& b_from_a);
 Json head();
 /// {"file", "width", "height", "valid_points", "noise_mm"}; the median of the estimated noise where none was stated.
 Json scan_summary(const Scan& scan, const Surfels* surfels);
+/// The same of loose points: one row of them.
+Json cloud_summary(const Surfels& surfels);
 Json stages(const StageTimes& times);
 Json warnings(const std::vector<Warning>& warnings, const std::vector<std::string>& more);
 /// One primitive by interfaces.md section 4; `spaces` gives the peak that found it, or null.

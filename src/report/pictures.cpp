@@ -63,6 +63,35 @@ std::string scan_pictures(const Observation& seen, int size_px) {
   return space_figures(seen, where, "the scan") + scan_figures(seen, where, view, 0);
 }
 
+std::string cloud_pictures(const Surfels& surfels, const Primitives& primitives, int size_px) {
+  Sighting all;
+  for (std::uint32_t i = 0; i < surfels.size(); ++i) all.surfels.push_back(i);
+  for (int k = 0; k < static_cast<int>(primitives.items.size()); ++k) all.primitives.push_back(k);
+  // A square in the tangent plane of each surfel, a little larger than its share of the surface, so that they close.
+  ShadedSurface squares;
+  for (std::uint32_t i : all.surfels) {
+    Vec3 u, v;
+    orthonormal_basis(surfels.normal[i].cast<double>(), u, v);
+    const float side = 0.75f * std::sqrt(surfels.area_mm2[i]);
+    const Vec3f a = side * u.cast<float>(), b = side * v.cast<float>(), p = surfels.position[i];
+    const auto first = static_cast<std::uint32_t>(squares.vertices.size());
+    for (const Vec3f& corner : {Vec3f(p - a - b), Vec3f(p + a - b), Vec3f(p + a + b), Vec3f(p - a + b)})
+      squares.vertices.push_back(corner);
+    squares.triangles.push_back({first, first + 1, first + 2});
+    squares.triangles.push_back({first, first + 2, first + 3});
+    const int id = primitives.label_of_surfel[i];
+    const Material material =
+        id > 0 ? material_of(primitives.items[static_cast<std::size_t>(id - 1)].type) : Material::none;
+    squares.materials.insert(squares.materials.end(), 2, material);
+    squares.tints.insert(squares.tints.end(), 2, id > 0 ? tint_of(id) : 0.0f);
+  }
+  Canvas canvas(view_of(surfels.position, Pose::Identity(), size_px));
+  canvas.draw(squares);
+  const Scan none;  // the spaces are drawn from surfels alone
+  return space_figures({none, surfels, primitives}, all, "the cloud") +
+         figure("f", "Segmentation by type; grey is unexplained", painted(canvas, 0, "Segmentation by type"));
+}
+
 std::string part_pictures(const Part& part, int size_px) {
   Pose pose = Pose::Identity();  // from the front, above: the part's z upwards
   pose.linear() = rotation_from_vector(Vec3(90 * kDegree, 0, 0));

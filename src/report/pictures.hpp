@@ -26,6 +26,9 @@ std::string ten_pictures(const Observation& seen, const Part& part, const Instan
 /// The seven pictures that need no part: spaces, cloud, segmentation, model.
 std::string scan_pictures(const Observation& seen, int size_px);
 
+/// The same of loose points: the spaces, and the segmentation as a disc for each point.
+std::string cloud_pictures(const Surfels& surfels, const Primitives& primitives, int size_px);
+
 /// The two pictures that need no scan: CAD, and the model made from it.
 std::string part_pictures(const Part& part, int size_px);
 

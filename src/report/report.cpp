@@ -100,9 +100,10 @@ void write_locate_report(const std::filesystem::path& dir, const Scan& scan, std
              locate_json(scan, found, {.times = context.times}));
 }
 
-void write_segment_report(const std::filesystem::path& dir, const Scan& scan, const Surfels& surfels,
-                          const Primitives& primitives, const PrimitiveModel& model, const StageTimes& times,
-                          const std::vector<Warning>& warnings, const ReportContext& context) {
+void write_segment_report(const std::filesystem::path& dir, const Surfels& surfels, const Primitives& primitives,
+                          const PrimitiveModel& model, const StageTimes& times, const std::vector<Warning>& warnings,
+                          const ReportContext& context) {
+  const bool scan = surfels.scan != nullptr;
   int count[4] = {0, 0, 0, 0};
   for (const Primitive& p : primitives.items) ++count[static_cast<int>(p.type)];
   const char* const words[] = {"plane", "cylinder", "cone", "sphere"};
@@ -112,20 +113,24 @@ void write_segment_report(const std::filesystem::path& dir, const Scan& scan, co
       sentence +=
           (sentence.empty() ? "" : ", ") + std::to_string(count[i]) + " " + words[i] + (count[i] == 1 ? "" : "s");
   std::vector<TocEntry> contents = {{"pictures", "Pictures"}, {"primitives", "Primitives"}};
-  std::string body = report::warning_lines(warnings, scan.warnings) +
-                     report::section("pictures", "Seven pictures", "") + "<div class=\"pics\">" +
-                     report::scan_pictures({scan, surfels, primitives}, 480) + "</div>" + report::picture_legend() +
-                     "</section>\n" +
-                     report::primitives_section(primitives.items, scan.input_from_camera, "In the input's frame.");
+  std::string body =
+      report::warning_lines(warnings, scan ? surfels.scan->warnings : surfels.point_set->warnings) +
+      report::section("pictures", scan ? "Seven pictures" : "Pictures", "") + "<div class=\"pics\">" +
+      (scan ? report::scan_pictures({*surfels.scan, surfels, primitives}, 480)
+            : report::cloud_pictures(surfels, primitives, 480)) +
+      "</div>" + report::picture_legend() + "</section>\n" +
+      report::primitives_section(primitives.items, scan ? surfels.scan->input_from_camera : Pose::Identity(),
+                                 "In the input's frame.");
   if (context.times) {
     contents.push_back({"time", "Time"});
     body += report::time_section(times, context.threads);
   }
   contents.push_back({"again", "Run it again"});
   body += report::again_section(context);
-  const std::string file = std::filesystem::path(scan.source).filename().string();
+  const std::string file =
+      std::filesystem::path(scan ? surfels.scan->source : surfels.point_set->source).filename().string();
   write_page(dir, report::page("tribin: " + file, sentence + " in " + file, "", "ok", "segmented", contents, body),
-             segment_json(scan, surfels, primitives, model, times, warnings, {.times = context.times}));
+             segment_json(surfels, primitives, model, times, warnings, {.times = context.times}));
 }
 
 void write_part_report(const std::filesystem::path& dir, const Part& part, const std::string& file,

@@ -129,6 +129,7 @@ void segmentation_detail::explain(Scene& scene, const Limits& limits, HoughSpace
     }
     if (found.size() == before) break;
   }
+  if (surfels.mesh == nullptr) find_by_great_circles(scene, limits, spaces, found);
 }
 
 Primitives segment(const Surfels& surfels, const SegmentationOptions& options) {
@@ -143,10 +144,7 @@ Primitives segment(const Surfels& surfels, const SegmentationOptions& options) {
   explain(scene, limits, out.spaces, found);
   if (surfels.point_set != nullptr) explain_rest(scene, limits, out.spaces, found);
 
-  if (surfels.mesh == nullptr) {
-    find_by_great_circles(scene, limits, out.spaces, found);
-    merge_pieces(scene, found);
-  }
+  if (surfels.mesh == nullptr) merge_pieces(scene, found);
 
   // Supports in order of their surfels, by one pass over the labels; then the largest first.
   for (FoundSurface& f : found) f.support.clear();

@@ -11,7 +11,8 @@ constexpr double kShortArc = 60.0 * kDegree;  // below, a free radius means litt
 // Share of the rim that goes on smoothly: cylinders of the development scans 0-0.28, patches of a plaster bust
 // 0.35-0.8.
 constexpr double kMaxSmoothRim = 0.30;
-constexpr double kSurfelsPerSigma = 28;  // pieces of the bust that end at edges: below 25; cylinders: above 28
+constexpr double kClosedArc = 330.0 * kDegree;  // less a slot
+constexpr double kSurfelsPerSigma = 28;         // pieces of the bust that end at edges: below 25; cylinders: above 28
 
 std::size_t kept(const Scene& scene, const Indices& component, const FoundSurface& c) {
   std::size_t count = 0;
@@ -123,7 +124,9 @@ bool accepted(Scene& scene, const Indices& component, const FoundSurface& c, dou
   // A piece cut out of a free-form surface: goes on smoothly past its rim, or leaves waves inside.
   const double rim = smooth_rim_share(scene, c.support);
   const double waves = residual_correlation(scene, c.support, c.fit.surface);
-  if (rim > kMaxSmoothRim || (rim > 0.2 && waves > 0.5)) return false;
+  // Closed around its axis it is no piece of anything: a shaft between two fillets goes on smoothly at either end.
+  const bool closed = arc > kClosedArc;
+  if (!closed && (rim > kMaxSmoothRim || (rim > 0.2 && waves > 0.5))) return false;
   // The rougher it lies, the more of it must be seen: curls of hair and lettering pass every other test.
   if (static_cast<double>(c.support.size()) < kSurfelsPerSigma * c.fit.rms_sigma && s.mesh == nullptr) return false;
   return true;
@@ -206,7 +209,10 @@ std::optional<FoundSurface> explain_round(Scene& scene, const Indices& component
       c.support = grow(scene, cone.surface, best->support, cone.scale, kRoundSlack);
       if (c.support.size() >= limits.min_surfels) {
         c.fit = fit_round(s, c.support, cone.surface, taper);
-        if (c.fit.valid && tapers(c.fit)) best = std::move(c);
+        // A piece gave the first estimate; the better one reaches all around.
+        if (c.fit.valid) c.support = grow(scene, c.fit.surface, c.support, c.fit.scale, kRoundSlack);
+        if (c.support.size() >= limits.min_surfels) c.fit = fit_round(s, c.support, c.fit.surface, taper);
+        if (c.support.size() >= limits.min_surfels && c.fit.valid && tapers(c.fit)) best = std::move(c);
       }
     }
   }

@@ -36,8 +36,7 @@ bool fit_in_frame(std::span<const Vec3f> points, std::span<const std::uint32_t> 
   }
   const Eigen::LDLT<Square> solver(h);
   // A pivot of less than 1e-6 of the number of points: the points lie on a line or on two.
-  if (solver.info() != Eigen::Success ||
-      solver.vectorD().minCoeff() < 1e-6 * static_cast<double>(window.size()))
+  if (solver.info() != Eigen::Success || solver.vectorD().minCoeff() < 1e-6 * static_cast<double>(window.size()))
     return false;
   const Column c = solver.solve(g);
   const Square covariance = solver.solve(Square::Identity());

@@ -15,11 +15,11 @@ struct PointQuadric {
   Vec3 origin = Vec3::Zero();
   Vec3 u = Vec3::UnitX(), v = Vec3::UnitY(), normal = Vec3::UnitZ();
   std::array<double, 6> c{};
-  std::array<double, 3> variance_slope{};   ///< of (c1, c1 c2, c2) for unit noise of one point
+  std::array<double, 3> variance_slope{};     ///< of (c1, c1 c2, c2) for unit noise of one point
   Matrix3 variance_square = Matrix3::Zero();  ///< of (c3, c4, c5)
-  double residual_mm = 0;                   ///< sd of one point about the quadric, degrees of freedom taken off
-  double reach_mm = 0;                      ///< radius of the window
-  int points = 0;                           ///< in the window; 0 = no fit
+  double residual_mm = 0;                     ///< sd of one point about the quadric, degrees of freedom taken off
+  double reach_mm = 0;                        ///< radius of the window
+  int points = 0;                             ///< in the window; 0 = no fit
 
   bool valid() const { return points > 0; }
   /// Height of a point over the quadric [mm].

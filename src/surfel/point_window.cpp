@@ -21,47 +21,60 @@ double median(std::vector<double>& values) {
   return *middle;
 }
 
+constexpr std::size_t kMost = 32;  // neighbours that triples are judged by
+
+/// Offsets of the neighbours from the point itself, and how far each may lie off.
+struct Offsets {
+  Vec3f at[kMost];
+  float limit[kMost];
+  std::size_t count = 0;
+};
+
+/// Normal of the plane through the point and two of its neighbours that most others are near to; zero where all lie on
+/// a line.
+Vec3f best_plane(const Offsets& o) {
+  Vec3f best = Vec3f::Zero();
+  float least = 1e30f;
+  const std::size_t triples = std::min(o.count, kTriples);
+  for (std::size_t a = 1; a < triples; ++a)
+    for (std::size_t b = a + 1; b < triples; ++b) {
+      const Vec3f across = o.at[a].cross(o.at[b]);
+      const float length = across.norm();
+      if (length < 0.3f * o.at[a].norm() * o.at[b].norm()) continue;  // 17 deg: next to a line
+      const Vec3f normal = across / length;
+      float cost = 0;
+      for (std::size_t i = 1; i < o.count && cost < least; ++i) {
+        const float r = normal.dot(o.at[i]) / o.limit[i];
+        cost += std::min(1.0f, r * r);
+      }
+      if (cost < least) least = cost, best = normal;
+    }
+  return best;
+}
+
 }  // namespace
 
 PointWindow smallest_window(std::span<const Vec3f> points, std::span<const std::uint32_t> near, double spacing) {
   PointWindow out;
   if (near.size() < kPlanePoints || !(spacing > 0)) return out;
   const Vec3f origin = points[near[0]];
-  constexpr std::size_t kMost = 32;
-  Vec3f offset[kMost];
-  float limit[kMost];
-  const std::size_t count = std::min(near.size(), kMost);
-  for (std::size_t i = 0; i < count; ++i) {
-    offset[i] = points[near[i]] - origin;
-    limit[i] = static_cast<float>(allowance(offset[i].squaredNorm(), spacing));
+  Offsets o;
+  o.count = std::min(near.size(), kMost);
+  for (std::size_t i = 0; i < o.count; ++i) {
+    o.at[i] = points[near[i]] - origin;
+    o.limit[i] = static_cast<float>(allowance(o.at[i].squaredNorm(), spacing));
   }
-  Vec3f best = Vec3f::Zero();
-  float least = 1e30f;
-  const std::size_t triples = std::min(count, kTriples);
-  for (std::size_t a = 1; a < triples; ++a)
-    for (std::size_t b = a + 1; b < triples; ++b) {
-      const Vec3f across = offset[a].cross(offset[b]);
-      const float length = across.norm();
-      if (length < 0.3f * offset[a].norm() * offset[b].norm()) continue;  // 17 deg: next to a line
-      const Vec3f normal = across / length;
-      float cost = 0;
-      for (std::size_t i = 1; i < count && cost < least; ++i) {
-        const float r = normal.dot(offset[i]) / limit[i];
-        cost += std::min(1.0f, r * r);
-      }
-      if (cost < least) least = cost, best = normal;
-    }
-  if (!(least < 1e30f)) return out;
+  const Vec3f best = best_plane(o);
+  if (best.isZero()) return out;
   std::vector<std::uint32_t> chosen;
-  for (std::size_t i = 0; i < count; ++i)
-    if (std::abs(best.dot(offset[i])) <= limit[i]) chosen.push_back(near[i]);
+  for (std::size_t i = 0; i < o.count; ++i)
+    if (std::abs(best.dot(o.at[i])) <= o.limit[i]) chosen.push_back(near[i]);
 
   std::vector<double> residuals;
   constexpr int kRounds = 4;  // a choice cut at 1 sigma comes back to 3 in that many
   for (int round = 0; round < kRounds; ++round) {
     out.bends = chosen.size() >= kQuadricPoints;
-    const PointQuadric q =
-        out.bends ? fit_point_quadric(points, chosen) : fit_point_plane(points, chosen);
+    const PointQuadric q = out.bends ? fit_point_quadric(points, chosen) : fit_point_plane(points, chosen);
     if (!q.valid()) {
       out.quadric = PointQuadric();
       return out;
@@ -73,14 +86,41 @@ PointWindow smallest_window(std::span<const Vec3f> points, std::span<const std::
     const double scale = 1.4826 * median(residuals) * std::sqrt(static_cast<double>(chosen.size()) / freedom);
     const double reach = std::max(3.0 * scale, 1e-3 * spacing);
     std::vector<std::uint32_t> next;
-    for (std::size_t i = 0; i < count; ++i) {
+    for (std::size_t i = 0; i < o.count; ++i) {
       const double off = std::abs(q.misfit(points[near[i]].cast<double>()));
-      if (i == 0 || off <= std::min<double>(reach, 2.0 * limit[i])) next.push_back(near[i]);
+      if (i == 0 || off <= std::min<double>(reach, 2.0 * o.limit[i])) next.push_back(near[i]);
     }
     if (next == chosen || next.size() < kPlanePoints) break;
     chosen = std::move(next);
   }
   return out;
+}
+
+PointWindow flat_or(const PointWindow& bent, std::span<const Vec3f> points, std::span<const std::uint32_t> near,
+                    double sigma) {
+  constexpr double kMostOf = 0.75;
+  if (!bent.bends || near.size() < kQuadricPoints) return bent;
+  Offsets o;
+  o.count = std::min(near.size(), kMost);
+  for (std::size_t i = 0; i < o.count; ++i) {
+    o.at[i] = points[near[i]] - points[near[0]];
+    o.limit[i] = static_cast<float>(3.0 * sigma);
+  }
+  const Vec3f best = best_plane(o);
+  std::vector<std::uint32_t> chosen;
+  for (std::size_t i = 0; i < o.count; ++i)
+    if (std::abs(best.dot(o.at[i])) <= o.limit[i]) chosen.push_back(near[i]);
+  for (int round = 0; round < 2; ++round) {
+    if (chosen.size() < kQuadricPoints) return bent;
+    const PointQuadric plane = fit_point_plane(points, chosen);
+    if (!plane.valid()) return bent;
+    chosen.clear();
+    for (std::size_t i = 0; i < o.count; ++i)
+      if (i == 0 || std::abs(plane.misfit(points[near[i]].cast<double>())) <= 3.0 * sigma) chosen.push_back(near[i]);
+  }
+  if (chosen.size() < kQuadricPoints || static_cast<double>(chosen.size()) < kMostOf * bent.quadric.points) return bent;
+  PointWindow out{fit_point_quadric(points, chosen), true};
+  return out.quadric.valid() ? out : bent;
 }
 
 PointWindow larger_window(std::span<const Vec3f> points, std::span<const std::uint32_t> near, const PointWindow& from,

@@ -20,6 +20,11 @@ struct PointWindow {
 /// features, 2010; the allowance for bending is ours.
 PointWindow smallest_window(std::span<const Vec3f> points, std::span<const std::uint32_t> near, double spacing);
 
+/// Where noise hides which it is, the window that is flat within 3 sigma, if it holds most points of `bent`: else edges
+/// of sparse clouds come out as cylinders.
+PointWindow flat_or(const PointWindow& bent, std::span<const Vec3f> points, std::span<const std::uint32_t> near,
+                    double sigma);
+
 /// The next larger window: of the `near` points those that lie on the quadric within 4 sigma. \return an invalid one
 /// where it no longer fits, or where nothing is gained.
 PointWindow larger_window(std::span<const Vec3f> points, std::span<const std::uint32_t> near, const PointWindow& from,

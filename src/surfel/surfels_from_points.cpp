@@ -24,6 +24,7 @@ constexpr std::size_t kStored = 24;  // the smallest: neighbours kept of each po
 // Sampling hides what is smaller than this share of the distance between points: coordinates rounded by a CAD system
 // or a file are better than that, and no surface is told from its tangent at that height.
 constexpr double kSamplingShare = 0.002;
+constexpr double kTightBend = 0.05;            // spacings: residual of a quadric on a circle of two spacings' radius
 constexpr double kSureNormal = 1.0 * kDegree;  // below the slack with which segmentation compares normals
 constexpr double kSureCurvature = 10;          // sigmas of curvature: the ruling is then good to 3 deg
 
@@ -52,7 +53,7 @@ std::vector<float> local_sigma(const std::vector<Vec3f>& points, const std::vect
                                const std::vector<float>& residual) {
   constexpr double kShare = 0.3;
   constexpr double kQuantileOfChi = 0.88;      // of sqrt(chi2 / f) at 0.3 for the 18 degrees of freedom of 24 points
-  constexpr double kTileSpacings = 8;         // as the tiles of 8 x 8 cells
+  constexpr double kTileSpacings = 8;          // as the tiles of 8 x 8 cells
   constexpr std::size_t kLeastResiduals = 30;  // a quantile of fewer is not known to a third
   std::vector<float> known, areas(area);
   for (float r : residual)
@@ -74,8 +75,8 @@ std::vector<float> local_sigma(const std::vector<Vec3f>& points, const std::vect
   std::vector<float> out(points.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
     const auto at = sigma.find(key(points[i]));
-    out[i] = static_cast<float>(
-        std::max(at == sigma.end() ? typical : at->second, kSamplingShare * std::sqrt(area[i])));
+    out[i] =
+        static_cast<float>(std::max(at == sigma.end() ? typical : at->second, kSamplingShare * std::sqrt(area[i])));
   }
   return out;
 }
@@ -103,9 +104,11 @@ Judged judge(const PointQuadric& q, double sigma) {
 
 /// The smallest window that decides: its normal is sure, and so is whether it bends.
 PointWindow grow_window(const PointTree& tree, const std::vector<Vec3f>& points, std::uint32_t i,
-                        const PointWindow& smallest, double sigma, double max_radius_mm) {
+                        const PointWindow& smallest, double sigma, double spacing, double max_radius_mm) {
   const auto passes = [&](const PointWindow& w) {
-    return w.quadric.valid() && w.quadric.residual_mm <= residual_limit(static_cast<std::size_t>(w.quadric.points)) * sigma;
+    // What is left of the tightest radius that a window can follow counts as the surface's.
+    const double noisy = residual_limit(static_cast<std::size_t>(w.quadric.points)) * sigma;
+    return w.quadric.valid() && w.quadric.residual_mm <= std::hypot(noisy, kTightBend * spacing);
   };
   PointWindow best;
   if (!passes(smallest)) return best;
@@ -184,8 +187,9 @@ void fill(Surfels& s, std::vector<float> sigma, const std::optional<Vec3>& viewp
   parallel_ranges(count, kGrain, [&](int begin, int end) {
     for (int k = begin; k < end; ++k) {
       const auto i = static_cast<std::size_t>(k);
-      windows[i] = grow_window(tree, s.position, static_cast<std::uint32_t>(i), smallest[i], s.sigma_mm[i],
-                               s.max_radius_mm);
+      const PointWindow start = flat_or(smallest[i], s.position, near[i], s.sigma_mm[i]);
+      windows[i] = grow_window(tree, s.position, static_cast<std::uint32_t>(i), start, s.sigma_mm[i],
+                               std::sqrt(s.area_mm2[i]), s.max_radius_mm);
     }
   });
   resize(s, s.size());
@@ -232,8 +236,7 @@ Surfels surfels_from_points(const PointSet& set, const SurfelOptions& options) {
   s.surfel_of_point = std::move(thin.of_point);
   // No radius in a cloud matters that is larger than the cloud.
   s.max_radius_mm = std::min(options.max_radius_mm, static_cast<float>(diagonal(s.position)));
-  if (!(s.max_radius_mm > 0))
-    throw Error(ErrorCode::too_little_data, set.source + ": all points lie in one place");
+  if (!(s.max_radius_mm > 0)) throw Error(ErrorCode::too_little_data, set.source + ": all points lie in one place");
   fill(s, {}, set.viewpoint);
   return s;
 }

@@ -15,9 +15,8 @@ using Key = std::array<std::int32_t, 3>;
 ThinPoints join_equal(std::span<const Vec3f> points, const std::vector<Key>& keys) {
   std::vector<std::uint32_t> order(points.size());
   for (std::uint32_t i = 0; i < order.size(); ++i) order[i] = i;
-  std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
-    return keys[a] != keys[b] ? keys[a] < keys[b] : a < b;
-  });
+  std::sort(order.begin(), order.end(),
+            [&](std::uint32_t a, std::uint32_t b) { return keys[a] != keys[b] ? keys[a] < keys[b] : a < b; });
   std::vector<std::uint32_t> first(points.size());  // of the point's group
   for (std::size_t at = 0; at < order.size(); ++at)
     first[order[at]] = at > 0 && keys[order[at]] == keys[order[at - 1]] ? first[order[at - 1]] : order[at];
@@ -65,8 +64,8 @@ ThinPoints thin_points(std::span<const Vec3f> points, std::size_t most) {
   ThinPoints out = join_equal(points, keys);
   if (out.position.size() <= most) return out;
   // A surface passes through 1.5 cubes (1 along the axes, 2 where it is aslant) per square of their side.
-  const double side =
-      typical_spacing(out.position) * std::sqrt(1.5 * static_cast<double>(out.position.size()) / static_cast<double>(most));
+  const double side = typical_spacing(out.position) *
+                      std::sqrt(1.5 * static_cast<double>(out.position.size()) / static_cast<double>(most));
   Vec3f low = points[0];
   for (const Vec3f& p : points) low = low.cwiseMin(p);
   for (std::size_t i = 0; i < points.size(); ++i)

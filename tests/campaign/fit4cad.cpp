@@ -3,10 +3,11 @@
 // Rule: for each true primitive the predicted one with most common points; Dice = 2 common / (true + predicted); mean
 // over a model's primitives, then over models; a type counts when that predicted one has it.
 
+#include "support/fit4cad.hpp"
+
 #include <cstdio>
 #include <cstring>
 
-#include "support/fit4cad.hpp"
 #include "tribin/core/error.hpp"
 #include "tribin/segmentation/primitives.hpp"
 
@@ -52,9 +53,11 @@ int run(bool verbose, const std::vector<int>& wanted) {
     const fit4cad::Model thin = fit4cad::noisy_tenth(*model, 0.003, static_cast<unsigned>(number));
     const fit4cad::Score rough = fit4cad::judge(thin, fit4cad::segment_cloud(thin.points));
     add(noisy, rough, thin.primitives.size());
-    std::printf("PC%-4d %6zu points %3zu primitives   clean Dice %.3f types %3d found %3d %5.2f s   noisy %.3f types %3d of %3zu found %3d %5.2f s\n", number,
-                model->points.points.size(), model->primitives.size(), exact.dice, exact.types_right, exact.predicted,
-                exact.seconds, rough.dice, rough.types_right, thin.primitives.size(), rough.predicted, rough.seconds);
+    std::printf(
+        "PC%-4d %6zu points %3zu primitives   clean Dice %.3f types %3d found %3d %5.2f s   noisy %.3f types %3d of "
+        "%3zu found %3d %5.2f s\n",
+        number, model->points.points.size(), model->primitives.size(), exact.dice, exact.types_right, exact.predicted,
+        exact.seconds, rough.dice, rough.types_right, thin.primitives.size(), rough.predicted, rough.seconds);
     if (verbose) print_misses(*model, exact);
     if (verbose) std::printf("    --- noisy\n"), print_misses(thin, rough);
     std::fflush(stdout);

@@ -111,7 +111,8 @@ inline std::optional<Model> read_model(int number) {
     model.points.points.push_back(Vec3(xyz[i], xyz[i + 1], xyz[i + 2]).cast<float>());
   std::vector<std::string> types, parameters;
   for (std::size_t at = surfaces.find(":="); at != std::string::npos; at = surfaces.find(":=", at + 2)) {
-    const std::size_t open = surfaces.find('[', at), comma = surfaces.find(',', open), close = surfaces.find(']', comma);
+    const std::size_t open = surfaces.find('[', at), comma = surfaces.find(',', open),
+                      close = surfaces.find(']', comma);
     std::string type = surfaces.substr(open + 1, comma - open - 1);
     type.erase(0, type.find_first_not_of(" '\""));
     types.push_back(type.substr(0, type.find_last_not_of(" '\"") + 1));

@@ -19,8 +19,9 @@ struct JsonOptions {
 std::string locate_json(const Scan& scan, const Found& found, const JsonOptions& options = {});
 
 /// The result of `tribin segment`: each primitive with its size, spread and covariance, and how they lie to each other.
-std::string segment_json(const Scan& scan, const Surfels& surfels, const Primitives& primitives,
-                         const PrimitiveModel& model, const StageTimes& times, const std::vector<Warning>& warnings,
+/// \param surfels  of a scan or of loose points; those count as one row.
+std::string segment_json(const Surfels& surfels, const Primitives& primitives, const PrimitiveModel& model,
+                         const StageTimes& times, const std::vector<Warning>& warnings,
                          const JsonOptions& options = {});
 
 /// The result of `tribin part`: what the CAD file gives, its symmetries, and how findable it is.

@@ -31,10 +31,10 @@ void write_locate_report(const std::filesystem::path& dir, const Scan& scan, std
                          const Found& found, const ReportContext& context,
                          const std::optional<ReportTruth>& truth = {});
 
-/// The same for a segmentation without parts.
-void write_segment_report(const std::filesystem::path& dir, const Scan& scan, const Surfels& surfels,
-                          const Primitives& primitives, const PrimitiveModel& model, const StageTimes& times,
-                          const std::vector<Warning>& warnings, const ReportContext& context);
+/// The same for a segmentation without parts, of a scan or of loose points.
+void write_segment_report(const std::filesystem::path& dir, const Surfels& surfels, const Primitives& primitives,
+                          const PrimitiveModel& model, const StageTimes& times, const std::vector<Warning>& warnings,
+                          const ReportContext& context);
 
 /// The same for a CAD file: primitives, symmetry, findability.
 void write_part_report(const std::filesystem::path& dir, const Part& part, const std::string& file,

@@ -60,11 +60,12 @@ struct SurfelOptions {
 /// \throws Error too_little_data when fewer than 100 pixels are valid.
 Surfels surfels_from_scan(const Scan& scan, const SurfelOptions& options = {});
 
-/// One surfel per point, from the smallest neighbourhood whose normal and curvature the noise lets decide; clouds of more
-/// than 200,000 points are thinned to means first. Without a viewpoint normals point outward as far as neighbours tell.
+/// One surfel per point, from the smallest neighbourhood whose normal and curvature the noise lets decide. Clouds of
+/// more than 200,000 points are thinned to means first. Without a viewpoint normals point outward as far as neighbours
+/// tell.
 /// \param options  max_radius_mm counts only as far as the cloud's diagonal.
-/// \throws Error  too_little_data for fewer than 30 points.
-/// \cost          50,000 points 0.5 s, 1,000,000 points 3 s (2 cores).
+/// \throws Error   too_little_data for fewer than 30 points.
+/// \cost           20,000 points 0.2 s, 1,000,000 points 4 s (2 cores).
 Surfels surfels_from_points(const PointSet& points, const SurfelOptions& options = {});
 
 /// The surfels of loose points again, fitted to some of them only: neighbourhoods no longer reach into what is
