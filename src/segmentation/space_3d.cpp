@@ -108,7 +108,9 @@ bool accepted(Scene& scene, const Indices& component, const FoundSurface& c, dou
   if (area_of(s, c.support) < limits.min_area_mm2) return false;
   if (c.fit.rms_sigma > kMaxRmsSigma) return false;
   // Most of what voted must lie on it; else it is a compromise between surfaces.
-  if (2 * kept(scene, component, c) < component.size()) return false;
+  // Two equal surfaces may share a component: then the fit is as good as noise lets it be.
+  const std::size_t on_it = kept(scene, component, c);
+  if ((c.fit.rms_sigma > 2 ? 2 : 4) * on_it < component.size()) return false;
   // The axis must be held by the data.
   if (std::sqrt(c.fit.covariance(0, 0) + c.fit.covariance(1, 1)) > 5.0 * kDegree) return false;
   // Clearly not a plane: the sagitta over the arc exceeds the residuals.

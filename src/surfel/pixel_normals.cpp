@@ -90,16 +90,32 @@ double residual_limit(int half, double sigma, double width_mm) {
   return std::hypot(1.2 * sigma * (1 + 3.5 / std::sqrt(2 * freedom)), kBendShare * width_mm);
 }
 
-/// Windows beside a depth edge: the eight that have the pixel on their rim, then the same at half the size.
-PlaneFit fit_beside_edge(const InverseDepth& in, int u, int v, int half, double sigma, double pitch_mm) {
+/// The best of the eight windows that have the pixel on their rim.
+PlaneFit fit_on_rim(const InverseDepth& in, int u, int v, int half, double sigma) {
   PlaneFit best;
+  for (int dv = -1; dv <= 1; ++dv)
+    for (int du = -1; du <= 1; ++du) {
+      if (du == 0 && dv == 0) continue;
+      const PlaneFit fit = fit_window(in, u, v, u + du * half, v + dv * half, half);
+      if (!fit.valid || std::abs(fit.at_pixel - in.d(u, v)) > 4 * std::max(sigma, fit.residual)) continue;
+      if (fit.residual < best.residual) best = fit;
+    }
+  return best;
+}
+
+/// A window that fails: beside an edge one on its rim fits far better; where all fail alike the surface bends, and the
+/// window about the pixel errs least. \return whether it is the latter.
+bool bends(const PlaneFit& centred, const PlaneFit& on_rim) {
+  return centred.valid && (!on_rim.valid || on_rim.residual > 0.5 * centred.residual);
+}
+
+/// Beside an edge: windows on the rim at half the size, and again, until one fits.
+PlaneFit fit_smaller(const InverseDepth& in, int u, int v, int half, PlaneFit best, double sigma, double pitch_mm) {
   for (int h = half; h >= 1; h /= 2) {
-    for (int dv = -1; dv <= 1; ++dv)
-      for (int du = -1; du <= 1; ++du) {
-        const PlaneFit fit = fit_window(in, u, v, u + du * h, v + dv * h, h);
-        if (!fit.valid || std::abs(fit.at_pixel - in.d(u, v)) > 4 * std::max(sigma, fit.residual)) continue;
-        if (fit.residual < best.residual) best = fit;
-      }
+    if (h < half) {
+      const PlaneFit fit = fit_on_rim(in, u, v, h, sigma);
+      if (fit.residual < best.residual) best = fit;
+    }
     if (best.residual <= residual_limit(h, sigma, (2 * h + 1) * pitch_mm)) break;
   }
   return best;
@@ -129,8 +145,12 @@ Image<Vec3f> by_inverse_depth(const Scan& scan, const Surfels& surfels, const In
         const double sigma =
             to_d * sigma_mm(std::min(u / (8 * n), sigma_mm.width - 1), std::min(v / (8 * n), sigma_mm.height - 1));
         PlaneFit fit = fit_window(in, u, v, u, v, half);
-        const bool whole = fit.valid && fit.residual <= residual_limit(half, sigma, window * pitch * to_d);
-        if (!whole) fit = fit_beside_edge(in, u, v, half, sigma, pitch * to_d);
+        bool whole = fit.valid && fit.residual <= residual_limit(half, sigma, window * pitch * to_d);
+        if (!whole) {
+          const PlaneFit on_rim = fit_on_rim(in, u, v, half, sigma);
+          whole = bends(fit, on_rim);
+          if (!whole) fit = fit_smaller(in, u, v, half, on_rim, sigma, pitch * to_d);
+        }
         if (!fit.valid) continue;
         Vec3 normal = in.normal(u, v, fit);
         const bool inside = surfels.surfel_of_cell.contains(u / n, v / n);
