@@ -1,6 +1,9 @@
 #include "report/pictures.hpp"
 
+#include <cmath>
+
 #include "report/html.hpp"
+#include "report/shapes.hpp"
 #include "report/solids.hpp"
 #include "report/space_art.hpp"
 
