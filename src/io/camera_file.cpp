@@ -5,6 +5,7 @@
 
 #include "io/atomic_file.hpp"
 #include "io/file_bytes.hpp"
+#include "tribin/core/distortion.hpp"
 #include "tribin/core/parallel.hpp"
 
 namespace tribin {
@@ -149,29 +150,18 @@ void write_camera_file(const std::filesystem::path& path, const CameraFile& file
 
 Image<Vec3f> undistorted_rays(const CameraFile& file) {
   const PinholeCamera& c = file.camera;
-  const double k1 = file.distortion[0], k2 = file.distortion[1], p1 = file.distortion[2], p2 = file.distortion[3],
-               k3 = file.distortion[4];
   Image<Vec3f> rays(c.width, c.height, Vec3f::Zero());
   parallel_ranges(c.height, 64, [&](int begin, int end) {
     for (int v = begin; v < end; ++v) {
       for (int u = 0; u < c.width; ++u) {
         const Vec3 seen = c.ray(u, v);
-        double x = seen.x(), y = seen.y(), residual = 1;
-        // Fixed point of Brown's model; 20 rounds reach 1e-9 for lenses that a depth camera can have.
-        for (int round = 0; round < 50 && residual > 1e-9; ++round) {
-          const double r2 = x * x + y * y, radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3));
-          const double next_x = (seen.x() - 2 * p1 * x * y - p2 * (r2 + 2 * x * x)) / radial;
-          const double next_y = (seen.y() - p1 * (r2 + 2 * y * y) - 2 * p2 * x * y) / radial;
-          residual = std::abs(next_x - x) + std::abs(next_y - y);
-          x = next_x;
-          y = next_y;
-        }
-        if (!(residual < 1e-6)) {
+        const std::optional<Vec2> ideal = undistorted(file.distortion, {seen.x(), seen.y()});
+        if (!ideal) {
           throw Error(ErrorCode::out_of_range, "distortion: pixel " + std::to_string(u) + ", " + std::to_string(v) +
                                                    " has no single ray: saw a model that folds the image, wanted one "
                                                    "that holds up to its corners");
         }
-        rays(u, v) = Vec3f(static_cast<float>(x), static_cast<float>(y), 1.0f);
+        rays(u, v) = Vec3f(static_cast<float>(ideal->x()), static_cast<float>(ideal->y()), 1.0f);
       }
     }
   });

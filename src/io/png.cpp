@@ -62,9 +62,12 @@ bool decode(Reading& reading, png_bytep* rows) {
   return true;
 }
 
-}  // namespace
+/// What a PNG's header says.
+struct Header {
+  int width = 0, height = 0, depth = 0, type = 0;
+};
 
-Image<std::uint16_t> decode_png16(const FileBytes& file) {
+Header read_header(const FileBytes& file) {
   static constexpr char kSignature[] = "\x89PNG\r\n\x1a\n";
   const std::string_view bytes = file.view();
   if (bytes.substr(0, 8) != std::string_view(kSignature, 8)) {
@@ -74,34 +77,41 @@ Image<std::uint16_t> decode_png16(const FileBytes& file) {
     bad_file(file.name, "byte 8", "no header", "a PNG header (IHDR)");
   const std::uint32_t width = big_endian(bytes, 16), height = big_endian(bytes, 20);
   const int depth = static_cast<unsigned char>(bytes[24]), type = static_cast<unsigned char>(bytes[25]);
-  if (depth != 16 || type != PNG_COLOR_TYPE_GRAY) {
-    bad_file(file.name, "byte 24", std::to_string(depth) + " bits a channel, colour type " + std::to_string(type),
-             "16-bit grey (a depth image)");
-  }
   // zlib packs at most 1032 : 1, so that a short file cannot hold a large image: nothing is allocated on a false claim.
   const std::size_t pixels = static_cast<std::size_t>(width) * height;
   if (width == 0 || height == 0 || width > 65535 || height > 65535 || pixels > kMaxPoints ||
-      pixels * 2 > bytes.size() * 1040) {
+      pixels * static_cast<std::size_t>(depth) / 8 > bytes.size() * 1040) {
     bad_file(file.name, "byte 16",
              "an image of " + std::to_string(width) + " x " + std::to_string(height) + " in " +
                  std::to_string(bytes.size()) + " bytes",
              "a size that the file can hold");
   }
-  Image<std::uint16_t> image(static_cast<int>(width), static_cast<int>(height));
-  std::vector<png_bytep> rows(height);
-  for (std::uint32_t v = 0; v < height; ++v) rows[v] = reinterpret_cast<png_bytep>(image.row(static_cast<int>(v)));
-  Reading reading{bytes};
+  return {static_cast<int>(width), static_cast<int>(height), depth, type};
+}
+
+[[noreturn]] void wrong_kind(const FileBytes& file, const Header& header, const char* wanted) {
+  bad_file(file.name, "byte 24",
+           std::to_string(header.depth) + " bits a channel, colour type " + std::to_string(header.type), wanted);
+}
+
+template <class T>
+Image<T> decode_pixels(const FileBytes& file, const Header& header) {
+  Image<T> image(header.width, header.height);
+  std::vector<png_bytep> rows(static_cast<std::size_t>(header.height));
+  for (int v = 0; v < header.height; ++v) rows[static_cast<std::size_t>(v)] = reinterpret_cast<png_bytep>(image.row(v));
+  Reading reading{file.view()};
   if (!decode(reading, rows.data())) {
     bad_file(file.name, at_byte(reading.at), reading.message, "a whole PNG image");
   }
   return image;
 }
 
-std::string encode_png16(const Image<std::uint16_t>& image) {
+template <class T>
+std::string encode_pixels(const Image<T>& image) {
   std::string out;
   std::vector<png_bytep> rows(image.height);
   for (int v = 0; v < image.height; ++v) {
-    rows[v] = reinterpret_cast<png_bytep>(const_cast<std::uint16_t*>(image.row(v)));
+    rows[v] = reinterpret_cast<png_bytep>(const_cast<T*>(image.row(v)));
   }
   Reading messages;
   png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, &messages, on_error, on_warning);
@@ -112,15 +122,34 @@ std::string encode_png16(const Image<std::uint16_t>& image) {
     throw Error(ErrorCode::internal, std::string("PNG writer: ") + messages.message);
   }
   png_set_write_fn(png, &out, on_write, nullptr);
-  png_set_IHDR(png, info, image.width, image.height, 16, PNG_COLOR_TYPE_GRAY, PNG_INTERLACE_NONE,
+  png_set_IHDR(png, info, image.width, image.height, 8 * sizeof(T), PNG_COLOR_TYPE_GRAY, PNG_INTERLACE_NONE,
                PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
   png_set_compression_level(png, 3);  // 4 times as fast as the default, 5 % larger
   png_write_info(png, info);
-  if constexpr (std::endian::native == std::endian::little) png_set_swap(png);
+  if constexpr (sizeof(T) == 2 && std::endian::native == std::endian::little) png_set_swap(png);
   png_write_image(png, rows.data());
   png_write_end(png, nullptr);
   png_destroy_write_struct(&png, &info);
   return out;
 }
+
+}  // namespace
+
+Image<std::uint16_t> decode_png16(const FileBytes& file) {
+  const Header header = read_header(file);
+  if (header.depth != 16 || header.type != PNG_COLOR_TYPE_GRAY) wrong_kind(file, header, "16-bit grey (a depth image)");
+  return decode_pixels<std::uint16_t>(file, header);
+}
+
+GreyImage decode_grey_png(const FileBytes& file) {
+  const Header header = read_header(file);
+  if ((header.depth != 8 && header.depth != 16) || header.type != PNG_COLOR_TYPE_GRAY)
+    wrong_kind(file, header, "grey of 8 or 16 bit (a camera image)");
+  if (header.depth == 8) return {decode_pixels<std::uint8_t>(file, header), {}};
+  return {{}, decode_pixels<std::uint16_t>(file, header)};
+}
+
+std::string encode_png8(const Image<std::uint8_t>& image) { return encode_pixels(image); }
+std::string encode_png16(const Image<std::uint16_t>& image) { return encode_pixels(image); }
 
 }  // namespace tribin::io

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "tribin/core/camera.hpp"
@@ -19,14 +20,32 @@ struct NoiseProfile {
   double offset_mm = 0;        ///< sd of a common depth offset (systematic)
 };
 
+/// Why a pixel has no measurement: values of Scan::invalid_reason. Decoders and simulators share them.
+enum class Invalid : std::uint8_t {
+  measured = 0,
+  nothing_there,       ///< no surface on the ray (known to simulators only)
+  shadow,              ///< out of the projector's sight (known to simulators only; a decoder finds it dark)
+  dark,                ///< too little fringe modulation to tell it from image noise
+  grazing,             ///< a surface seen or lit too flat
+  saturated,           ///< too few pattern images below the camera's full scale
+  lost,                ///< for no reason that is modelled
+  uncertain_bit,       ///< a code bit lies within the image noise of its threshold
+  order_inconsistent,  ///< code and phase, or the phases of several periods, contradict each other
+  unmatched,           ///< the other camera does not see this place, or sees it twice
+  out_of_view          ///< no source pixel: outside of the raw image, or beyond what the rig can measure
+};
+inline constexpr int kInvalidReasons = 11;
+/// The enumerator's own name.
+std::string_view name_of(Invalid reason);
+
 /// An organized depth scan: z along the optical axis of an ideal pinhole. x and y are never stored.
 struct Scan {
   Image<float> z_mm;  ///< H x W, NaN = no measurement
   PinholeCamera camera;
   NoiseProfile noise;
-  Image<std::uint8_t> modulation;  ///< H x W grey levels of fringe modulation; empty if not known
-  Image<std::uint8_t> invalid_reason;
-  Image<Vec3f> rays;  ///< only where the grid is no pinhole: ray with z = 1 of each pixel; else empty
+  Image<std::uint8_t> modulation;      ///< H x W grey levels of fringe modulation; empty if not known
+  Image<std::uint8_t> invalid_reason;  ///< H x W of Invalid; empty if not known
+  Image<Vec3f> rays;                   ///< only where the grid is no pinhole: ray with z = 1 of each pixel; else empty
   Pose input_from_camera = Pose::Identity();  ///< the file's own frame; results are given in it
   std::string source;                         ///< file name, for messages
   std::vector<std::string> warnings;

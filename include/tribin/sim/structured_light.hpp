@@ -40,9 +40,6 @@ struct Body {
   double shine = 1;  ///< 0 matt .. 1 machined metal: scales StructuredLight::highlight
 };
 
-/// Why a pixel has no measurement: values of Scan::invalid_reason.
-enum class Invalid : std::uint8_t { measured = 0, nothing_there, shadow, dark, grazing, saturated, lost };
-
 /// What the camera sees of one body. Counts as in BOP.
 struct BodyTruth {
   Pose camera_from_body = Pose::Identity();
