@@ -2,19 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <tuple>
 
 #include "cad/triangle_tree.hpp"
+#include "tribin/cad/half_edges.hpp"
 #include "tribin/cad/measure.hpp"
 
 namespace tribin {
 namespace {
-
-struct Edge {
-  std::uint32_t low, high;  ///< its vertices, the smaller number first
-  std::uint32_t triangle;
-  bool forward;  ///< whether the triangle runs it from low to high
-};
 
 /// The neighbour over each of a triangle's edges, or none; and whether the two run the edge the same way (a mistake).
 struct Neighbours {
@@ -23,7 +17,7 @@ struct Neighbours {
   std::array<bool, 3> against{false, false, false};
 };
 
-void link(std::vector<Neighbours>& neighbours, const Edge& a, const Edge& b) {
+void link(std::vector<Neighbours>& neighbours, const HalfEdge& a, const HalfEdge& b) {
   const auto add = [&](std::uint32_t from, std::uint32_t to) {
     Neighbours& n = neighbours[from];
     for (int i = 0; i < 3; ++i) {
@@ -39,28 +33,13 @@ void link(std::vector<Neighbours>& neighbours, const Edge& a, const Edge& b) {
 
 /// Links triangles over the edges that have just two; edges of more are left, where shells may touch.
 std::vector<Neighbours> neighbours_of(const Mesh& mesh, std::vector<int>& open, MendReport& report) {
-  std::vector<Edge> edges;
-  edges.reserve(3 * mesh.triangles.size());
-  for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i) {
-    const auto& t = mesh.triangles[i];
-    for (int k = 0; k < 3; ++k) {
-      const std::uint32_t a = t[k], b = t[(k + 1) % 3];
-      edges.push_back({std::min(a, b), std::max(a, b), i, a < b});
-    }
-  }
-  std::sort(edges.begin(), edges.end(), [](const Edge& a, const Edge& b) {
-    return std::tie(a.low, a.high, a.triangle) < std::tie(b.low, b.high, b.triangle);
-  });
   std::vector<Neighbours> neighbours(mesh.triangles.size());
   open.assign(mesh.triangles.size(), 0);
-  for (std::size_t i = 0, next = 0; i < edges.size(); i = next) {
-    next = i;
-    while (next < edges.size() && edges[next].low == edges[i].low && edges[next].high == edges[i].high) ++next;
-    if (next - i == 2) link(neighbours, edges[i], edges[i + 1]);
-    if (next - i == 2) continue;
-    (next - i == 1 ? report.boundary_edges : report.junction_edges) += 1;
-    for (std::size_t k = i; k < next; ++k) ++open[edges[k].triangle];
-  }
+  for_each_edge(sorted_half_edges(mesh.triangles), [&](std::span<const HalfEdge> edge) {
+    if (edge.size() == 2) return link(neighbours, edge[0], edge[1]);
+    (edge.size() == 1 ? report.boundary_edges : report.junction_edges) += 1;
+    for (const HalfEdge& half : edge) ++open[half.triangle];
+  });
   return neighbours;
 }
 

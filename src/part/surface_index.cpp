@@ -5,8 +5,8 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
-#include <tuple>
 
+#include "tribin/cad/half_edges.hpp"
 #include "tribin/core/error.hpp"
 
 namespace tribin {
@@ -44,14 +44,6 @@ Vec3 nearest_on_triangle(const Vec3& a, const Vec3& ab, const Vec3& ac, const Ve
   const double scale = 1 / (va + vb + vc);
   return a + vb * scale * ab + vc * scale * ac;
 }
-
-struct HalfEdge {
-  std::uint32_t low, high;
-  std::int32_t triangle;
-  bool operator<(const HalfEdge& other) const {
-    return std::tie(low, high, triangle) < std::tie(other.low, other.high, other.triangle);
-  }
-};
 
 }  // namespace
 
@@ -100,24 +92,14 @@ SurfaceIndex::SurfaceIndex(const Mesh& mesh) : oriented_(mesh.oriented) {
 
 /// Finds for each facet how much the surface that it stands for may bulge from it, by the angles to its neighbours.
 void SurfaceIndex::measure_facets(const Mesh& mesh, const std::vector<int>& kept) {
-  std::vector<HalfEdge> edges;
-  edges.reserve(3 * kept.size());
-  for (std::size_t i = 0; i < kept.size(); ++i) {
-    const auto& t = mesh.triangles[kept[i]];
-    for (int k = 0; k < 3; ++k) {
-      const auto [low, high] = std::minmax(t[k], t[(k + 1) % 3]);
-      edges.push_back({low, high, static_cast<std::int32_t>(i)});
-    }
-  }
-  std::sort(edges.begin(), edges.end());
+  std::vector<std::array<std::uint32_t, 3>> triangles;
+  for (const int k : kept) triangles.push_back(mesh.triangles[static_cast<std::size_t>(k)]);
   std::vector<float> slack_of_vertex(mesh.vertices.size(), 0);
   const double least = mesh.chord_error_mm, most = kLargestSlack * diameter_mm_;
-  for (std::size_t i = 0; i + 1 < edges.size(); ++i) {
-    const HalfEdge &e = edges[i], &f = edges[i + 1];
-    if (e.low != f.low || e.high != f.high) continue;
+  const auto bend = [&](const HalfEdge& e, const HalfEdge& f) {
     Triangle &s = triangles_[e.triangle], &t = triangles_[f.triangle];
     const double angle = std::atan2(s.normal.cross(t.normal).norm(), s.normal.dot(t.normal));
-    if (angle < kFlatAngle || angle > kSmoothAngle) continue;
+    if (angle < kFlatAngle || angle > kSmoothAngle) return;
     const double length = (mesh.vertices[e.low] - mesh.vertices[e.high]).cast<double>().norm();
     const double narrow = 2 * std::min(s.area, t.area) / std::max(length, 1e-12);
     const double wide = 2 * std::max(s.area, t.area) / std::max(length, 1e-12);
@@ -128,7 +110,10 @@ void SurfaceIndex::measure_facets(const Mesh& mesh, const std::vector<int>& kept
     s.bend = std::max(s.bend, angle);
     t.bend = std::max(t.bend, angle);
     for (const auto v : {e.low, e.high}) slack_of_vertex[v] = std::max(slack_of_vertex[v], static_cast<float>(slack));
-  }
+  };
+  for_each_edge(sorted_half_edges(triangles), [&](std::span<const HalfEdge> edge) {
+    for (std::size_t i = 0; i + 1 < edge.size(); ++i) bend(edge[i], edge[i + 1]);
+  });
   // By way of the vertices, so that the flat face beside a round, whose rim is cut by the same chords, gets it too.
   for (std::size_t i = 0; i < kept.size(); ++i)
     for (const auto v : mesh.triangles[kept[i]])

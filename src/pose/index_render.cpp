@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <tuple>
+
+#include "tribin/cad/half_edges.hpp"
 
 namespace tribin {
 namespace {
@@ -14,31 +15,14 @@ struct ScreenVertex {
 
 /// Every edge once, without those between coplanar triangles, which are never an outline.
 std::vector<OutlineEdge> outline_edges(const RenderMesh& mesh) {
-  struct Half {
-    std::uint32_t low, high;
-    std::int32_t triangle;
-  };
-  std::vector<Half> halves;
-  halves.reserve(mesh.triangles.size() * 3);
-  for (std::size_t k = 0; k < mesh.triangles.size(); ++k)
-    for (std::size_t i = 0; i < 3; ++i) {
-      const std::uint32_t a = mesh.triangles[k][i], b = mesh.triangles[k][(i + 1) % 3];
-      halves.push_back({std::min(a, b), std::max(a, b), static_cast<std::int32_t>(k)});
-    }
-  std::sort(halves.begin(), halves.end(), [](const Half& a, const Half& b) {
-    return std::tie(a.low, a.high, a.triangle) < std::tie(b.low, b.high, b.triangle);
-  });
   std::vector<OutlineEdge> out;
-  for (std::size_t i = 0; i < halves.size();) {
-    std::size_t j = i + 1;
-    while (j < halves.size() && halves[j].low == halves[i].low && halves[j].high == halves[i].high) ++j;
-    OutlineEdge e{{halves[i].low, halves[i].high}, {halves[i].triangle, j > i + 1 ? halves[i + 1].triangle : -1}};
-    const bool coplanar =
-        e.triangles[1] >= 0 && mesh.normals[static_cast<std::size_t>(e.triangles[0])].dot(
-                                   mesh.normals[static_cast<std::size_t>(e.triangles[1])]) > 0.999999f;
-    if (!coplanar && j - i <= 2) out.push_back(e);
-    i = j;
-  }
+  for_each_edge(sorted_half_edges(mesh.triangles), [&](std::span<const HalfEdge> edge) {
+    if (edge.size() > 2) return;  // where shells touch
+    const std::uint32_t left = edge[0].triangle, right = edge.back().triangle;
+    if (edge.size() == 2 && mesh.normals[left].dot(mesh.normals[right]) > 0.999999f) return;
+    out.push_back({{edge[0].low, edge[0].high},
+                   {static_cast<std::int32_t>(left), edge.size() == 2 ? static_cast<std::int32_t>(right) : -1}});
+  });
   return out;
 }
 

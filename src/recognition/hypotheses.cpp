@@ -8,7 +8,6 @@ namespace tribin {
 SceneFeatures make_scene_features(const Primitives& primitives, const PrimitiveModel& observation,
                                   const Surfels& surfels) {
   SceneFeatures out;
-  out.observation = &observation;
   out.surfels = &surfels;
   out.primitives = &primitives;
   for (const Primitive& p : observation.primitives) {

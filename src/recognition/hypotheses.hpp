@@ -21,7 +21,6 @@ struct SceneFeature {
 /// The scene as the generators see it.
 struct SceneFeatures {
   std::vector<SceneFeature> features;  ///< one a primitive of the observation, same order
-  const PrimitiveModel* observation = nullptr;
   const Surfels* surfels = nullptr;
   const Primitives* primitives = nullptr;
   Image<std::uint8_t> claimed;  ///< cells that an accepted instance explains; empty = none

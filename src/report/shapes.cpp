@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <tuple>
+
+#include "tribin/cad/half_edges.hpp"
 
 namespace tribin::report {
 
@@ -45,33 +46,16 @@ Vec3 normal_of(const Mesh& mesh, std::size_t t) {
 }  // namespace
 
 std::vector<Edge> edges_of(const Mesh& mesh) {
-  struct Half {
-    std::uint32_t a, b;
-    std::int32_t triangle;
-  };
-  std::vector<Half> halves;
-  halves.reserve(mesh.triangles.size() * 3);
-  for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
-    for (int i = 0; i < 3; ++i) {
-      const std::uint32_t a = mesh.triangles[t][i], b = mesh.triangles[t][(i + 1) % 3];
-      halves.push_back({std::min(a, b), std::max(a, b), static_cast<std::int32_t>(t)});
-    }
-  std::sort(halves.begin(), halves.end(), [](const Half& l, const Half& r) {
-    return std::tie(l.a, l.b, l.triangle) < std::tie(r.a, r.b, r.triangle);
-  });
   const double kCrease = std::cos(25 * kDegree);  // finer turns are the facets of a curved face
   std::vector<Edge> out;
-  for (std::size_t i = 0; i < halves.size();) {
-    std::size_t end = i + 1;
-    while (end < halves.size() && halves[end].a == halves[i].a && halves[end].b == halves[i].b) ++end;
-    Edge edge{halves[i].a, halves[i].b, halves[i].triangle, -1, true};
-    if (end - i == 2) {
-      edge.right = halves[i + 1].triangle;
+  for_each_edge(sorted_half_edges(mesh.triangles), [&](std::span<const HalfEdge> half) {
+    Edge edge{half[0].low, half[0].high, static_cast<std::int32_t>(half[0].triangle), -1, true};
+    if (half.size() == 2) {
+      edge.right = static_cast<std::int32_t>(half[1].triangle);
       edge.crease = normal_of(mesh, edge.left).normalized().dot(normal_of(mesh, edge.right).normalized()) < kCrease;
     }
     out.push_back(edge);
-    i = end;
-  }
+  });
   return out;
 }
 

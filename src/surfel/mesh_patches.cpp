@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numeric>
 
+#include "tribin/cad/half_edges.hpp"
+
 namespace tribin::surfel_detail {
 namespace {
 
@@ -11,42 +13,23 @@ namespace {
 // and far below the 2 deg of the finest tessellation.
 constexpr double kCoplanar = 0.1 * kDegree;
 
-struct HalfEdge {
-  std::uint32_t low, high, triangle;
-  bool forward;
-};
-
 std::uint32_t root_of(std::vector<std::uint32_t>& parent, std::uint32_t i) {
   while (parent[i] != i) i = parent[i] = parent[parent[i]];
   return i;
 }
 
 std::vector<MeshEdge> find_edges(const Mesh& mesh, const std::vector<Vec3>& normal) {
-  std::vector<HalfEdge> half;
-  half.reserve(3 * mesh.triangles.size());
-  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t)
-    for (int k = 0; k < 3; ++k) {
-      const std::uint32_t a = mesh.triangles[t][k], b = mesh.triangles[t][(k + 1) % 3];
-      half.push_back({std::min(a, b), std::max(a, b), t, a < b});
-    }
-  std::sort(half.begin(), half.end(), [](const HalfEdge& x, const HalfEdge& y) {
-    return std::tie(x.low, x.high, x.triangle) < std::tie(y.low, y.high, y.triangle);
-  });
   std::vector<MeshEdge> edges;
-  for (std::size_t i = 0; i + 1 < half.size(); ++i) {
-    std::size_t end = i + 1;
-    while (end < half.size() && half[end].low == half[i].low && half[end].high == half[i].high) ++end;
-    if (end - i == 2) {  // edges of one or of three triangles join nothing
-      const std::uint32_t a = half[i].triangle, b = half[i + 1].triangle;
-      const Vec3 v0 = mesh.vertices[half[i].low].cast<double>(), v1 = mesh.vertices[half[i].high].cast<double>();
-      const Vec3 along = half[i].forward ? Vec3(v1 - v0) : Vec3(v0 - v1);  // as triangle a runs
-      const Vec3 cross = normal[a].cross(normal[b]);
-      const double angle = std::atan2(cross.norm(), normal[a].dot(normal[b]));
-      edges.push_back({a, b, half[i].low, half[i].high, static_cast<float>(cross.dot(along) >= 0 ? angle : -angle),
-                       static_cast<float>(along.norm())});
-    }
-    i = end - 1;
-  }
+  for_each_edge(sorted_half_edges(mesh.triangles), [&](std::span<const HalfEdge> half) {
+    if (half.size() != 2) return;  // edges of one or of three triangles join nothing
+    const std::uint32_t a = half[0].triangle, b = half[1].triangle;
+    const Vec3 v0 = mesh.vertices[half[0].low].cast<double>(), v1 = mesh.vertices[half[0].high].cast<double>();
+    const Vec3 along = half[0].forward ? Vec3(v1 - v0) : Vec3(v0 - v1);  // as triangle a runs
+    const Vec3 cross = normal[a].cross(normal[b]);
+    const double angle = std::atan2(cross.norm(), normal[a].dot(normal[b]));
+    edges.push_back({a, b, half[0].low, half[0].high, static_cast<float>(cross.dot(along) >= 0 ? angle : -angle),
+                     static_cast<float>(along.norm())});
+  });
   return edges;
 }
 
