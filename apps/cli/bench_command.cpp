@@ -2,6 +2,7 @@
 #include <cmath>
 #include <iostream>
 
+#include "bench_peers.hpp"
 #include "commands.hpp"
 #include "output.hpp"
 #include "paper_tables.hpp"
@@ -22,7 +23,7 @@ struct Options {
   int poses = 40;
   int first = 1;
   double noise_mm = 0.1, noise_correlation_px = 1;
-  bool no_times = false;
+  bool no_times = false, peers = false;
 };
 
 #ifdef TRIBIN_WITH_SIM
@@ -105,6 +106,11 @@ PaperRun run_one(const std::vector<Part>& parts, const std::vector<eval::Model>&
 
 int run(const Options& options, const Context& context) {
   const std::vector<Part> parts = read_parts(part_arguments(options.parts), options.unit);
+  if (options.peers) {
+    constexpr int kScenes = 3;  // of each part: a peer takes seconds for one
+    std::cout << compare_with_peers(parts, options.first, std::min(kScenes, options.poses));
+    return 0;
+  }
   std::vector<eval::Model> models;
   for (const Part& part : parts) models.push_back(eval::model_of(part));
   std::vector<PaperRun> runs;
@@ -158,6 +164,7 @@ void add_bench(CLI::App& app, Context& context) {
       ->type_name("M");
   command->add_option("--unit", options->unit, "Unit of CAD files that name none: mm, cm, m, inch")->type_name("U");
   command->add_option("--json", options->json, "Write every run as JSON; - is stdout")->type_name("OUT|-");
+  command->add_flag("--peers", options->peers, "Instead: normals and segmentation beside other libraries");
   command->add_flag("--no-times", options->no_times, "Leave the times out: same input, same bytes");
   command->callback([options, &context] { context.run = [options, &context] { return run(*options, context); }; });
 }
