@@ -77,7 +77,7 @@ std::vector<Indices> components(Scene& scene, std::span<const std::uint32_t> mem
 bool fits(const Surfels& s, std::uint32_t i, const Surface& surface, double scale, double slack) {
   const Vec3 p = s.position[i].cast<double>();
   if (std::abs(misfit(s, i, surface)) > 4.0 * scale * s.sigma_mm[i]) return false;
-  if (s.sigma_normal[i] >= 1) return true;  // no normal: loose points beside edges
+  if (s.point_set != nullptr && s.sigma_normal[i] >= 1) return true;  // no normal: loose points beside edges
   const double limit = std::min(4.0 * scale * s.sigma_normal[i] + slack, 60.0 * kDegree);
   // 1 - x^2 / 2 + x^4 / 24 is the cosine to 1e-3 up to 60 deg, without a call per surfel.
   const double x2 = limit * limit;
