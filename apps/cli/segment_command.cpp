@@ -26,6 +26,7 @@ void print_table(const Primitives& primitives) {
     if (p.type == PrimitiveType::cylinder)
       std::printf(" %9.3f %9.2f %9.1f%s", p.radius_mm, p.height_mm(), p.arc / kDegree, p.concave ? "  concave" : "");
     if (p.type == PrimitiveType::sphere) std::printf(" %9.3f", p.radius_mm);
+    if (p.type == PrimitiveType::torus) std::printf(" %9.3f  tube %.3f", p.radius_mm, p.minor_radius_mm);
     std::printf("\n");
   }
 }

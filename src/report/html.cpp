@@ -55,12 +55,13 @@ std::string cell(const std::string& content) { return "<td class=\"num\">" + con
 std::string unit(const std::string& name) { return " <span class=\"u\">" + name + "</span>"; }
 
 std::string type_icon(PrimitiveType type) {
-  static const char* const kNames[] = {"plane", "cylinder", "cone", "sphere"};
+  static const char* const kNames[] = {"plane", "cylinder", "cone", "sphere", "torus"};
   static const char* const kPaths[] = {
       "<path d=\"M2 11.5 6 4.5h8l-4 7z\"/>",
       "<path d=\"M4 4v8c0 1 2 2 4 2s4-1 4-2V4\"/><ellipse cx=\"8\" cy=\"4\" rx=\"4\" ry=\"1.8\"/>",
       "<path d=\"M8 2 3.5 12c0 1 2 2 4.5 2s4.5-1 4.5-2z\"/>",
-      "<circle cx=\"8\" cy=\"8\" r=\"5.6\"/><path d=\"M2.5 8.500c2 2 9 2 11 0\"/>"};
+      "<circle cx=\"8\" cy=\"8\" r=\"5.6\"/><path d=\"M2.5 8.500c2 2 9 2 11 0\"/>",
+      "<ellipse cx=\"8\" cy=\"8\" rx=\"6.2\" ry=\"4.4\"/><ellipse cx=\"8\" cy=\"7.6\" rx=\"2.6\" ry=\"1.3\"/>"};
   const int i = static_cast<int>(type);
   const std::string name = kNames[i];
   return "<svg class=\"ty " + name + "\" viewBox=\"0 0 16 16\" role=\"img\" aria-label=\"" + name + "\">" + kPaths[i] +

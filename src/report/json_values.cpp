@@ -146,6 +146,13 @@ Json primitive(const Primitive& p, const HoughSpaces* spaces) {
       out["arc_deg"] = degrees(p.arc);
       out["concave"] = p.concave;
       break;
+    case PrimitiveType::torus:
+      out["axis"] = unit_vector(p.axis);
+      out["center_mm"] = millimetres(p.point);
+      out["radius_mm"] = millimetres(p.radius_mm);
+      out["minor_radius_mm"] = millimetres(p.minor_radius_mm);
+      out["concave"] = p.concave;
+      break;
     case PrimitiveType::sphere:
       out["center_mm"] = millimetres(p.point);
       out["radius_mm"] = millimetres(p.radius_mm);
@@ -189,9 +196,11 @@ Json relation(const Relation& r, const Pose& b_from_a) {
 }
 
 Json counts(const std::vector<Primitive>& primitives) {
-  int count[4] = {0, 0, 0, 0};
+  int count[5] = {0, 0, 0, 0, 0};
   for (const Primitive& primitive : primitives) ++count[static_cast<int>(primitive.type)];
-  return {{"planes", count[0]}, {"cylinders", count[1]}, {"cones", count[2]}, {"spheres", count[3]}};
+  Json out = {{"planes", count[0]}, {"cylinders", count[1]}, {"cones", count[2]}, {"spheres", count[3]}};
+  if (count[4] > 0) out["tori"] = count[4];
+  return out;
 }
 
 namespace {

@@ -38,7 +38,7 @@ Json warnings(const std::vector<Warning>& warnings, const std::vector<std::strin
 /// One primitive by interfaces.md section 4; `spaces` gives the peak that found it, or null.
 Json primitive(const Primitive& primitive, const HoughSpaces* spaces);
 Json relation(const Relation& relation, const Pose& b_from_a);
-/// {"planes", "cylinders", "cones", "spheres"}: how many there are.
+/// {"planes", "cylinders", "cones", "spheres"}: how many there are; "tori" where there are any.
 Json counts(const std::vector<Primitive>& primitives);
 
 /// The document as text: two spaces a level, but vectors and matrix rows on one line; ends with a newline.

@@ -45,7 +45,7 @@ details>summary{cursor:pointer;padding:6px 2px;font-size:13px;color:var(--text-2
 .cls{display:inline-grid;place-items:center;width:18px;height:18px;border-radius:4px;font-size:11px;line-height:18px;font-weight:700;color:var(--surface);flex:none}
 .cls.ca{background:var(--ca)}.cls.cb{background:var(--cb)}.cls.cc{background:var(--cc)}.cls.cd{background:var(--cd)}.cls.ce{background:var(--ce)}.cls.cf{background:var(--cf)}
 .ty{width:16px;height:16px;vertical-align:-3px;flex:none;fill:none;stroke-width:1.4;stroke-linejoin:round}
-.ty.plane{stroke:var(--plane)}.ty.cylinder{stroke:var(--cylinder)}.ty.cone{stroke:var(--cone)}.ty.sphere{stroke:var(--sphere)}
+.ty.plane{stroke:var(--plane)}.ty.cylinder{stroke:var(--cylinder)}.ty.cone{stroke:var(--cone)}.ty.sphere,.ty.torus{stroke:var(--sphere)}
 figure{margin:0;background:var(--surface);border:1px solid var(--line);border-radius:8px;overflow:hidden;display:flex;flex-direction:column}
 figure .art{aspect-ratio:1/1;position:relative;display:grid;place-items:center}figure .art>*,figure img{display:block;width:100%;height:auto}
 figure.wide{margin-top:12px}figure.wide .art{aspect-ratio:auto}

@@ -47,7 +47,9 @@ Rgb shaded(const Rgb& colour, double shade) {
 
 }  // namespace
 
-Material material_of(PrimitiveType type) { return static_cast<Material>(type); }
+Material material_of(PrimitiveType type) {
+  return type == PrimitiveType::torus ? Material::sphere : static_cast<Material>(type);  // both bend two ways
+}
 
 std::uint8_t index_of(Material material, double shade, int step) {
   const int level = std::clamp(static_cast<int>(shade * kShades), 0, kShades - 1);

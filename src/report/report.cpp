@@ -104,14 +104,14 @@ void write_segment_report(const std::filesystem::path& dir, const Surfels& surfe
                           const PrimitiveModel& model, const StageTimes& times, const std::vector<Warning>& warnings,
                           const ReportContext& context) {
   const bool scan = surfels.scan != nullptr;
-  int count[4] = {0, 0, 0, 0};
+  int count[5] = {0, 0, 0, 0, 0};
   for (const Primitive& p : primitives.items) ++count[static_cast<int>(p.type)];
-  const char* const words[] = {"plane", "cylinder", "cone", "sphere"};
+  const char* const one[] = {"plane", "cylinder", "cone", "sphere", "torus"};
+  const char* const many[] = {"planes", "cylinders", "cones", "spheres", "tori"};
   std::string sentence;
-  for (int i = 0; i < 4; ++i)
+  for (int i = 0; i < 5; ++i)
     if (count[i] > 0 || i < 2)
-      sentence +=
-          (sentence.empty() ? "" : ", ") + std::to_string(count[i]) + " " + words[i] + (count[i] == 1 ? "" : "s");
+      sentence += (sentence.empty() ? "" : ", ") + std::to_string(count[i]) + " " + (count[i] == 1 ? one : many)[i];
   std::vector<TocEntry> contents = {{"pictures", "Pictures"}, {"primitives", "Primitives"}};
   std::string body =
       report::warning_lines(warnings, scan ? surfels.scan->warnings : surfels.point_set->warnings) +

@@ -331,7 +331,8 @@ std::string primitives_section(const std::vector<Primitive>& primitives, const P
                          2);
   for (const Primitive& p : primitives) {
     const Vec3 axis = b_from_a.linear() * p.axis;
-    const bool round = p.type == PrimitiveType::cylinder || p.type == PrimitiveType::sphere;
+    const bool round =
+        p.type == PrimitiveType::cylinder || p.type == PrimitiveType::sphere || p.type == PrimitiveType::torus;
     const bool high = p.type == PrimitiveType::cylinder || p.type == PrimitiveType::cone;
     out += "<tr><td>" + std::to_string(p.id) + "</td><td>" + type_icon(p.type) + " " + name_of(p.type) +
            (p.concave ? " <span class=\"muted\">concave</span>" : "") + (p.name.empty() ? "" : " " + escaped(p.name)) +

@@ -16,6 +16,11 @@ ShapePoint nearest_on(const Primitive& p, const Vec3& x) {
       const Vec3 normal = from.normalized();
       return {p.point + p.radius_mm * normal, normal};
     }
+    case PrimitiveType::torus: {
+      const Vec3 along = from.dot(p.axis) * p.axis, middle = p.point + p.radius_mm * (from - along).normalized();
+      const Vec3 normal = (x - middle).normalized();
+      return {middle + p.minor_radius_mm * normal, normal};
+    }
     case PrimitiveType::cylinder: {
       const Vec3 along = from.dot(p.axis) * p.axis, normal = (from - along).normalized();
       return {p.point + along + p.radius_mm * normal, normal};

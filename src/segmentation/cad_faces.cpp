@@ -28,6 +28,9 @@ bool same_surface(const CadFace& a, const CadFace& b) {
     case SurfaceType::sphere:
       return std::abs(a.radius_mm - b.radius_mm) < kSameMm && (a.point - b.point).norm() < kSameMm;
     case SurfaceType::torus:
+      return std::abs(a.radius_mm - b.radius_mm) < kSameMm &&
+             std::abs(a.minor_radius_mm - b.minor_radius_mm) < kSameMm && (a.point - b.point).norm() < kSameMm &&
+             same_line(a, b);
     case SurfaceType::free_form:
       return false;
   }

@@ -5,8 +5,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "segmentation/round_fit.hpp"
-
 namespace tribin::segmentation_detail {
 namespace {
 
@@ -138,23 +136,25 @@ Fit fit_plane(const Surfels& surfels, std::span<const std::uint32_t> support) {
 }
 
 double curvature_bound(const Surfels& surfels, std::span<const std::uint32_t> support, const Fit& plane) {
+  using Six = Eigen::Matrix<double, 6, 6>;
+  using Row = Eigen::Matrix<double, 6, 1>;
   Vec3 u, v;
   orthonormal_basis(plane.surface.axis, u, v);
-  Square h = Square::Zero();
-  Column g = Column::Zero();
+  Six h = Six::Zero();
+  Row g = Row::Zero();
   for (std::uint32_t i : support) {
     const Vec3 q = surfels.position[i].cast<double>() - plane.surface.point;
     const double x = q.dot(u), y = q.dot(v);
     const double weight = 1.0 / std::pow(surfels.sigma_mm[i] * plane.scale, 2);
-    Column row;
+    Row row;
     row << 1, x, y, 0.5 * x * x, x * y, 0.5 * y * y;
     h += weight * row * row.transpose();
     g += weight * row * plane.surface.axis.dot(q);
   }
-  const Eigen::LDLT<Square> solver(h);
+  const Eigen::LDLT<Six> solver(h);
   if (solver.info() != Eigen::Success || solver.vectorD().minCoeff() <= 0) return 1e30;
-  const Column c = solver.solve(g);
-  const Square covariance = correlation_inflation(surfels) * solver.solve(Square::Identity());
+  const Row c = solver.solve(g);
+  const Six covariance = correlation_inflation(surfels) * solver.solve(Six::Identity());
   const double middle = 0.5 * (c[3] + c[5]), half = std::sqrt(0.25 * (c[3] - c[5]) * (c[3] - c[5]) + c[4] * c[4]);
   return std::abs(middle) + half + 2.0 * std::sqrt(std::max(covariance(3, 3), covariance(5, 5)));
 }
@@ -246,6 +246,53 @@ Surface cone_from_normals(const Surfels& surfels, std::span<const std::uint32_t>
     s.concave = true;
   }
   s.point = origin + apex + s.axis * t;
+  return s;
+}
+
+Surface torus_from_curvature(const Surfels& surfels, std::span<const std::uint32_t> support) {
+  Surface s;
+  s.type = PrimitiveType::torus;
+  std::vector<double> curvatures;
+  for (std::uint32_t i : support) curvatures.push_back(surfels.curvature1[i]);
+  const double curvature = median_of(curvatures);
+  if (curvature == 0) return s;
+  const double tube = 1.0 / curvature;
+  // The circle that the tube runs along: its plane, then its middle and radius by algebraic distances.
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d second = Eigen::Matrix3d::Zero();
+  std::vector<Eigen::Vector3d> spine;
+  spine.reserve(support.size());
+  for (std::uint32_t i : support) {
+    spine.push_back(surfels.position[i].cast<double>() - tube * surfels.normal[i].cast<double>());
+    mean += spine.back();
+  }
+  const double count = static_cast<double>(support.size());
+  mean /= count;
+  for (Eigen::Vector3d& p : spine) {
+    p -= mean;
+    second += p * p.transpose();
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(second);
+  const Eigen::Vector3d u = solver.eigenvectors().col(2), v = solver.eigenvectors().col(1);
+  Eigen::Matrix3d a = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d b = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3d& p : spine) {
+    const Eigen::Vector3d row(p.dot(u), p.dot(v), 1);
+    a += row * row.transpose();
+    b += row * row.head<2>().squaredNorm();
+  }
+  const Eigen::LDLT<Eigen::Matrix3d> fit(a);
+  if (fit.info() != Eigen::Success || !(fit.vectorD().minCoeff() > 1e-9 * count)) return s;
+  const Eigen::Vector3d c = fit.solve(b);
+  const double square = c[2] + 0.25 * (c[0] * c[0] + c[1] * c[1]);
+  if (!(square > 0)) return s;
+  s.axis = solver.eigenvectors().col(0);
+  if (s.axis.z() < 0) s.axis = -s.axis;
+  s.point = Vec3(mean + 0.5 * (c[0] * u + c[1] * v));
+  s.radius = std::sqrt(square);
+  s.minor_radius = std::abs(tube);
+  s.concave = tube < 0;
+  if (s.minor_radius >= s.radius) s.radius = 0;  // would meet itself: a sphere or a cylinder is meant
   return s;
 }
 

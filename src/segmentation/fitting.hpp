@@ -14,8 +14,9 @@ using Indices = std::vector<std::uint32_t>;
 struct Surface {
   PrimitiveType type = PrimitiveType::plane;
   Vec3 axis = Vec3::UnitZ();  ///< plane: normal on the side of the surfels' normals
-  Vec3 point = Vec3::Zero();  ///< plane: on it; cylinder, cone: on the axis, where `radius` holds; sphere: centre
+  Vec3 point = Vec3::Zero();  ///< plane: on it; cylinder, cone: on the axis, where `radius` holds; else centre
   double radius = 0;          ///< mm
+  double minor_radius = 0;    ///< torus: of the tube; `radius` is that of the circle it runs along
   double half_angle = 0;      ///< cone: the radius grows by tan(half_angle) along the axis [rad], any sign
   bool concave = false;
 
@@ -24,6 +25,9 @@ struct Surface {
   /// Normal at the foot of p, on the side of the surfels' normals (towards the axis where concave).
   Vec3 normal(const Vec3& p) const;
 };
+
+/// How many numbers fix a surface of a type.
+int parameters_of(PrimitiveType type);
 
 /// The raw points behind a surfel that fits run on: the corrected mean of a scan's cell; the three vertices of a
 /// triangle, which lie on the true surface where the facet does not. \return how many were written.
@@ -55,8 +59,8 @@ Fit fit_plane(const Surfels& surfels, std::span<const std::uint32_t> support);
 /// of a quadric fitted to them; infinite where the support is too small to say.
 double curvature_bound(const Surfels& surfels, std::span<const std::uint32_t> support, const Fit& plane);
 
-/// Levenberg-Marquardt on geometric distances to a cylinder, cone or sphere with a Geman-McClure kernel that shrinks
-/// from `start_mm` to the noise. \param start  a surface near the solution.
+/// Levenberg-Marquardt on geometric distances to a cylinder, cone, sphere or torus with a Geman-McClure kernel that
+/// shrinks from `start_mm` to the noise. \param start  a surface near the solution.
 Fit fit_round(const Surfels& surfels, std::span<const std::uint32_t> support, const Surface& start,
               const FitOptions& options = {});
 
@@ -76,6 +80,9 @@ Surface cone_from_normals(const Surfels& surfels, std::span<const std::uint32_t>
 
 /// How many times fewer the data of a scan are than its cells, for their noise is correlated: >= 1.
 double correlation_inflation(const Surfels& surfels);
+
+/// A torus from its surfels' tighter curvature: one tube radius along the normals lie the points of a circle.
+Surface torus_from_curvature(const Surfels& surfels, std::span<const std::uint32_t> support);
 
 /// Robust size of residuals in sigmas: 1.4826 MAD about 0, at least 1, at most what one raw point scatters.
 double residual_scale(const Surfels& surfels, std::span<const std::uint32_t> support, const Surface& surface);

@@ -18,6 +18,7 @@ Surface surface_of(const Primitive& p) {
   s.axis = p.axis;
   s.point = p.point;
   s.radius = p.radius_mm;
+  s.minor_radius = p.minor_radius_mm;
   s.half_angle = p.half_angle;
   s.concave = p.concave;
   return s;

@@ -106,7 +106,7 @@ double meet(const Surface& c, const Vec3& ray) {
 /// Whether the scan looks through the surface between the two pieces: something seen behind it says that it ends there.
 bool seen_through(const Scene& scene, const Surface& joint, double scale, const Indices& a, const Indices& b) {
   const Surfels& s = scene.surfels;
-  if (joint.type == PrimitiveType::sphere) return false;
+  if (joint.type == PrimitiveType::sphere || joint.type == PrimitiveType::torus) return false;
   const Extent ea = extent_of(s, a, joint), eb = extent_of(s, b, joint);
   const double low = std::min(ea.high, eb.high), high = std::max(ea.low, eb.low);
   if (high - low < 3 * scene.cell_mm) return false;  // side by side: no room for an end
@@ -139,18 +139,12 @@ double chi2_of(const Surfels& s, const Indices& support, const Surface& surface,
   return sum;
 }
 
-int parameters_of(PrimitiveType type) {
-  switch (type) {
-    case PrimitiveType::plane:
-      return 3;
-    case PrimitiveType::sphere:
-      return 4;
-    case PrimitiveType::cylinder:
-      return 5;
-    case PrimitiveType::cone:
-      return 6;
-  }
-  return 0;
+/// Whether a surface leaves nothing but noise on a support: chi-square within 3 sd. Where noise cut one piece from
+/// another, each was fitted to data chosen to agree with it, and two fits seem better than they are.
+bool only_noise(const Surfels& s, const Indices& support, const Fit& fit, double scale) {
+  const double count = static_cast<double>(support.size());
+  return chi2_of(s, support, fit.surface, scale) <
+         count * (1.0 + 3.0 * std::sqrt(2.0 * correlation_inflation(s) / count));
 }
 
 /// One surface of `type` in place of two, where it explains both as well as its fewer parameters ask.
@@ -163,7 +157,11 @@ std::optional<FoundSurface> joined(Scene& scene, const FoundSurface& a, const Fo
   options.hold_radius = a.radius_from_cad && b.radius_from_cad;
   options.cone = type == PrimitiveType::cone;
   options.max_surfels = 1500;
-  const Fit fit = fit_round(s, both, a.fit.surface, options);
+  // Two strips that were taken for cylinders are far from their cone: its normals say where it is.
+  const bool strips = type == PrimitiveType::cone && a.fit.surface.type != type;
+  const Surface start = strips ? cone_from_normals(s, both) : a.fit.surface;
+  if (!(start.radius > 0)) return std::nullopt;
+  const Fit fit = fit_round(s, both, start, options);
   if (!fit.valid || fit.rms_sigma > kMaxRmsSigma) return std::nullopt;
   if (type == PrimitiveType::cone && !tapers(fit)) return std::nullopt;
   const double scale = std::max(a.fit.scale, b.fit.scale);
@@ -174,7 +172,8 @@ std::optional<FoundSurface> joined(Scene& scene, const FoundSurface& a, const Fo
   const double count = static_cast<double>(both.size()), inflation = correlation_inflation(s) * waves;
   const double variance = std::max(1.0, apart / count) * inflation;
   const int saved = parameters_of(a.fit.surface.type) + parameters_of(b.fit.surface.type) - parameters_of(type);
-  if ((together - apart) / variance > saved * std::log(std::max(2.0, count / inflation))) return std::nullopt;
+  const bool simpler = (together - apart) / variance <= saved * std::log(std::max(2.0, count / inflation));
+  if (!simpler && !(only_noise(s, a.support, fit, scale) && only_noise(s, b.support, fit, scale))) return std::nullopt;
   if (seen_through(scene, fit.surface, fit.scale, a.support, b.support)) return std::nullopt;
   FoundSurface out;
   out.fit = fit;
@@ -194,6 +193,17 @@ bool mostly_on(const Surfels& s, const Indices& support, const Fit& fit) {
   return 2 * on > count;
 }
 
+/// Whether surfels of one support are neighbours of the other's.
+bool touching(const Scene& scene, const Indices& a, const Indices& b) {
+  if (a.empty() || b.empty()) return false;
+  const Surfels& s = scene.surfels;
+  const std::int32_t other = scene.label[a.front()];
+  return std::any_of(b.begin(), b.end(), [&](std::uint32_t i) {
+    return std::any_of(s.neighbours.begin() + s.neighbour_begin[i], s.neighbours.begin() + s.neighbour_begin[i + 1],
+                       [&](std::uint32_t j) { return scene.label[j] == other; });
+  });
+}
+
 /// What may replace two surfaces: one of the larger's kind, or a cone of which both are strips.
 std::optional<FoundSurface> one_of(Scene& scene, const FoundSurface& large, const FoundSurface& small) {
   const Surface &p = large.fit.surface, &q = small.fit.surface;
@@ -204,14 +214,18 @@ std::optional<FoundSurface> one_of(Scene& scene, const FoundSurface& large, cons
     if (p.type != PrimitiveType::cylinder || std::abs(p.axis.dot(q.axis)) < std::cos(kMaxTilt)) return false;
     return same_cylinder(large.fit, small.fit, waves);
   };
+  // Strips of one cone may look like cylinders of their own: only a joint fit says.
+  const auto axial = [](const Surface& f) {
+    return f.type == PrimitiveType::cylinder || f.type == PrimitiveType::cone;
+  };
+  const bool strips = axial(p) && axial(q) && p.concave == q.concave && touching(scene, large.support, small.support);
   // Where even the slowest waves would not make them one, their waves need not be known.
   const bool covered = mostly_on(scene.surfels, small.support, large.fit);
-  if (!covered && !same(kMostWaves)) return std::nullopt;
+  if (!covered && !strips && !same(kMostWaves)) return std::nullopt;
   const double waves = std::max(wave_inflation(scene, large), wave_inflation(scene, small));
-  if (!covered && !same(waves)) return std::nullopt;
-  std::optional<FoundSurface> one = joined(scene, large, small, p.type, waves);
-  if (!one && p.type == PrimitiveType::cylinder && q.type != PrimitiveType::plane)
-    one = joined(scene, large, small, PrimitiveType::cone, waves);
+  std::optional<FoundSurface> one;
+  if (covered || same(waves)) one = joined(scene, large, small, p.type, waves);
+  if (!one && strips) one = joined(scene, large, small, PrimitiveType::cone, waves);
   return one;
 }
 

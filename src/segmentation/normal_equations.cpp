@@ -11,8 +11,9 @@ constexpr std::size_t kLanes = 4;  // partial sums of every dot product, whateve
 
 /// What the loops over points need of a surface, as plain numbers.
 struct Numbers {
-  double px, py, pz, ax, ay, az, ux, uy, uz, vx, vy, vz, radius, c, s;
-  explicit Numbers(const Surface& f) : radius(f.radius), c(std::cos(f.half_angle)), s(std::sin(f.half_angle)) {
+  double px, py, pz, ax, ay, az, ux, uy, uz, vx, vy, vz, radius, minor, c, s;
+  explicit Numbers(const Surface& f)
+      : radius(f.radius), minor(f.minor_radius), c(std::cos(f.half_angle)), s(std::sin(f.half_angle)) {
     Vec3 u, v;
     orthonormal_basis(f.axis, u, v);
     px = f.point.x(), py = f.point.y(), pz = f.point.z();
@@ -65,6 +66,35 @@ TRIBIN_VECTOR_LEVELS void axial_rows(const Numbers& k, std::size_t n, const doub
   }
 }
 
+/// As for a cone whose half angle is that of each point's place on the tube: the normal is (c e - s a) with
+/// c = (r - radius) / l, s = -t / l, l the distance from the tube's circle.
+TRIBIN_VECTOR_LEVELS void torus_rows(const Numbers& k, std::size_t n, const double* __restrict x,
+                                     const double* __restrict y, const double* __restrict z, const double* __restrict w,
+                                     double* __restrict residual, double* __restrict j0, double* __restrict j1,
+                                     double* __restrict j2, double* __restrict j3, double* __restrict j4,
+                                     double* __restrict j5, double* __restrict j6) {
+  const Numbers a = k;
+  for (std::size_t i = 0; i < n; ++i) {
+    const double qx = x[i] - a.px, qy = y[i] - a.py, qz = z[i] - a.pz;
+    const double t = a.ax * qx + a.ay * qy + a.az * qz;
+    const double ru = a.ux * qx + a.uy * qy + a.uz * qz, rv = a.vx * qx + a.vy * qy + a.vz * qz;
+    const double r = std::sqrt(ru * ru + rv * rv);
+    const double inverse = 1.0 / std::max(r, 1e-9);
+    const double eu = ru * inverse, ev = rv * inverse, weight = w[i];
+    const double off = r - a.radius, l = std::sqrt(off * off + t * t);
+    const double c = off / std::max(l, 1e-9), s = -t / std::max(l, 1e-9);
+    const double lever = (t * c + r * s) * weight;
+    residual[i] = (l - a.minor) * weight;
+    j0[i] = lever * ev;
+    j1[i] = -lever * eu;
+    j2[i] = -eu * c * weight;
+    j3[i] = -ev * c * weight;
+    j4[i] = -c * weight;
+    j5[i] = -weight;
+    j6[i] = s * weight;
+  }
+}
+
 /// Robust weights times the derivatives: sqrt of the weight on both sides of each product.
 TRIBIN_VECTOR_LEVELS void root_weights(std::size_t n, const double* __restrict e, double mu2, double* __restrict out) {
   for (std::size_t i = 0; i < n; ++i) out[i] = mu2 / (mu2 + e[i] * e[i]);
@@ -109,13 +139,30 @@ void FitPoints::add(const Vec3& p, double inverse) {
 void linearise(const Surface& surface, const FitPoints& points, Linearised& out) {
   const std::size_t n = points.size();
   out.residual.resize(n);
-  for (auto& j : out.jacobian) j.resize(n);
+  switch (surface.type) {
+    case PrimitiveType::sphere:
+      out.active = {0, 1, 2, 4};
+      break;
+    case PrimitiveType::cone:
+      out.active = {0, 1, 2, 3, 4, 5};
+      break;
+    case PrimitiveType::torus:
+      out.active = {0, 1, 2, 3, 4, 5, 6};
+      break;
+    default:
+      out.active = {0, 1, 2, 3, 4};
+  }
   auto& j = out.jacobian;
+  for (auto& column : j) column.resize(n);
   const double *x = points.x.data(), *y = points.y.data(), *z = points.z.data(), *w = points.inverse_sigma.data();
   const Numbers numbers(surface);
   if (surface.type == PrimitiveType::sphere) {
     sphere_rows(numbers, n, x, y, z, w, out.residual.data(), j[0].data(), j[1].data(), j[2].data(), j[4].data());
-    for (int k : {3, 5}) std::fill(j[k].begin(), j[k].end(), 0.0);
+    return;
+  }
+  if (surface.type == PrimitiveType::torus) {
+    torus_rows(numbers, n, x, y, z, w, out.residual.data(), j[0].data(), j[1].data(), j[2].data(), j[3].data(),
+               j[4].data(), j[5].data(), j[6].data());
     return;
   }
   axial_rows(numbers, n, x, y, z, w, out.residual.data(), j[0].data(), j[1].data(), j[2].data(), j[3].data(),
@@ -131,9 +178,12 @@ NormalEquations weigh(const Linearised& at, double mu) {
     const std::size_t n = std::min(kBlock, at.residual.size() - from);
     root_weights(n, at.residual.data() + from, mu * mu, root.data());
     scaled(n, root.data(), at.residual.data() + from, residual.data());
-    for (int a = 0; a < kParameters; ++a) scaled(n, root.data(), at.jacobian[a].data() + from, rows[a].data());
-    for (int a = 0; a < kParameters; ++a) {
-      for (int b = 0; b <= a; ++b) sum.h(a, b) += dot(n, rows[a].data(), rows[b].data());
+    for (int a : at.active) scaled(n, root.data(), at.jacobian[a].data() + from, rows[a].data());
+    for (int a : at.active) {
+      for (int b : at.active) {
+        if (b > a) break;
+        sum.h(a, b) += dot(n, rows[a].data(), rows[b].data());
+      }
       sum.g[a] += dot(n, rows[a].data(), residual.data());
     }
   }
@@ -156,23 +206,23 @@ Surface stepped(const Surface& surface, const Column& step) {
   orthonormal_basis(surface.axis, u, v);
   out.axis = (rotation_from_vector(u * step[0] + v * step[1]) * surface.axis).normalized();
   out.point += u * step[2] + v * step[3];
-  out.half_angle += step[5];
+  if (surface.type == PrimitiveType::torus) {
+    out.minor_radius += step[5];
+    out.point += surface.axis * step[6];
+  } else {
+    out.half_angle += step[5];
+  }
   return out;
 }
 
-void hold(NormalEquations& equations, const Surface& surface, const FitOptions& options) {
-  const auto freeze = [&](int i) {
+void hold(NormalEquations& equations, const std::vector<int>& active, bool hold_radius) {
+  for (int i = 0; i < kParameters; ++i) {
+    const bool free = std::find(active.begin(), active.end(), i) != active.end() && !(hold_radius && i == 4);
+    if (free) continue;
     equations.h.row(i).setZero();
     equations.h.col(i).setZero();
     equations.h(i, i) = 1;
     equations.g[i] = 0;
-  };
-  if (options.hold_radius) freeze(4);
-  if (surface.type == PrimitiveType::sphere) {
-    freeze(3);
-    freeze(5);
-  } else if (!options.cone) {
-    freeze(5);
   }
 }
 

@@ -133,7 +133,10 @@ double scale_of(const std::vector<double>& residual, double limit, std::vector<d
   return std::clamp(kMadToSigma * *middle, 1.0, std::max(1.0, limit));
 }
 
-bool possible(const Surface& s) { return s.radius > 0 && std::abs(s.half_angle) < 85 * kDegree; }
+bool possible(const Surface& s) {
+  if (s.type == PrimitiveType::torus && !(s.minor_radius > 0 && s.minor_radius < s.radius)) return false;
+  return s.radius > 0 && std::abs(s.half_angle) < 85 * kDegree;
+}
 
 /// rms of the residuals within 4 `scale`, in sigmas.
 double rms_of(const std::vector<double>& residual, double scale) {
@@ -148,19 +151,15 @@ double rms_of(const std::vector<double>& residual, double scale) {
 }
 
 /// Covariance of what was fitted. \param inflation  data per datum that is independent. \return whether there is one.
-bool covariance_of(const NormalEquations& equations, const Surface& s, const FitOptions& options, double inflation,
+bool covariance_of(const NormalEquations& equations, const std::vector<int>& active, bool hold_radius, double inflation,
                    Matrix6& out) {
   const Eigen::LDLT<Square> solver(equations.h);
   if (solver.info() != Eigen::Success || solver.vectorD().minCoeff() <= 0) return false;
-  Square covariance = inflation * solver.solve(Square::Identity());
-  const auto clear = [&](int i) {
-    covariance.row(i).setZero();
-    covariance.col(i).setZero();
-  };
-  if (options.hold_radius) clear(4);
-  if (s.type == PrimitiveType::sphere) clear(3);
-  if (s.type == PrimitiveType::sphere || !options.cone) clear(5);
-  out = covariance;
+  const Square covariance = inflation * solver.solve(Square::Identity());
+  out.setZero();
+  for (int a : active)
+    for (int b : active)
+      if (a < 6 && b < 6 && !(hold_radius && (a == 4 || b == 4))) out(a, b) = covariance(a, b);
   return true;
 }
 
@@ -189,7 +188,7 @@ Fit fit_round(const Surfels& surfels, std::span<const std::uint32_t> support, co
   constexpr int kMaxIterations = 40;
   for (int iteration = 0, settled = 0; iteration < kMaxIterations && settled < 2; ++iteration) {
     NormalEquations equations = weigh(at, mu);
-    hold(equations, s, options);
+    hold(equations, at.active, options.hold_radius);
     const double cost = robust_cost(at.residual, mu);
     bool improved = false;
     double step = 0;
@@ -218,7 +217,7 @@ Fit fit_round(const Surfels& surfels, std::span<const std::uint32_t> support, co
   }
 
   // Refer the axis to the middle of the data, where tilt and shift are least correlated.
-  if (s.type != PrimitiveType::sphere) {
+  if (s.type == PrimitiveType::cylinder || s.type == PrimitiveType::cone) {
     double low = 1e300, high = -1e300;
     for (std::size_t i = 0; i < data.size(); ++i) {
       const double t = s.axis.dot(Vec3(data.x[i], data.y[i], data.z[i]) - s.point);
@@ -234,11 +233,12 @@ Fit fit_round(const Surfels& surfels, std::span<const std::uint32_t> support, co
   fit.scale = residual_scale(surfels, support, s);
   fit.rms_sigma = rms_of(at.residual, fit.scale);
   NormalEquations equations = weigh(at, kWidth * fit.scale);
-  hold(equations, s, options);
+  hold(equations, at.active, options.hold_radius);
   // Correlated noise averages down less than the number of data says; a sparse sample is less correlated.
   const double share = std::min(1.0, static_cast<double>(data.size()) / static_cast<double>(support.size()));
   const double inflation = std::max(1.0, correlation_inflation(surfels) * share);
-  if (!covariance_of(equations, s, options, inflation * std::max(1.0, fit.rms_sigma * fit.rms_sigma), fit.covariance))
+  if (!covariance_of(equations, at.active, options.hold_radius,
+                     inflation * std::max(1.0, fit.rms_sigma * fit.rms_sigma), fit.covariance))
     return fit;
   fit.surface = s;
   fit.valid = true;
@@ -248,6 +248,7 @@ Fit fit_round(const Surfels& surfels, std::span<const std::uint32_t> support, co
 bool refine_on_pixels(const Surfels& surfels, std::span<const std::uint32_t> support, const FitOptions& options,
                       std::span<const std::int32_t> label, Fit& fit) {
   TRIBIN_ASSERT(surfels.scan != nullptr);
+  if (fit.surface.type == PrimitiveType::torus) return false;  // its rays are quartic
   // Under correlated noise a third of the pixels per independent one say all; a large support is good to more than the
   // sensor.
   constexpr double kMost = 60000, kLeast = 3000;
@@ -272,7 +273,7 @@ bool refine_on_pixels(const Surfels& surfels, std::span<const std::uint32_t> sup
     scale =
         scale_of(at.residual, 2.0, scratch);  // pixels scatter by their sigma; the waves below it are theirs as well
     equations = weigh(at, kWidth * scale);
-    hold(equations, s, options);
+    hold(equations, at.active, options.hold_radius);
     const Column x = -equations.h.ldlt().solve(equations.g);
     if (!x.allFinite()) return false;
     s = stepped(s, x);
@@ -282,7 +283,8 @@ bool refine_on_pixels(const Surfels& surfels, std::span<const std::uint32_t> sup
   const double rms = rms_of(at.residual, scale);
   const double share = std::min(1.0, static_cast<double>(at.residual.size()) / points);
   Matrix6 covariance;
-  if (!covariance_of(equations, s, options, std::max(1.0, information * share) * std::max(1.0, rms * rms), covariance))
+  if (!covariance_of(equations, at.active, options.hold_radius,
+                     std::max(1.0, information * share) * std::max(1.0, rms * rms), covariance))
     return false;
   fit.surface = s;
   fit.covariance = covariance;

@@ -8,7 +8,9 @@
 
 namespace tribin::segmentation_detail {
 
-inline constexpr int kParameters = 6;  ///< in the order of Primitive::covariance
+/// Tilt about u, tilt about v, shift along u, shift along v, radius, half angle or minor radius, shift along the axis;
+/// sphere: the centre in 0-2, the radius in 4. The first six are the order of Primitive::covariance.
+inline constexpr int kParameters = 7;
 using Square = Eigen::Matrix<double, kParameters, kParameters>;
 using Column = Eigen::Matrix<double, kParameters, 1>;
 
@@ -25,11 +27,11 @@ struct FitPoints {
 /// Residuals of all points about a surface and their derivatives, both in sigmas.
 struct Linearised {
   std::vector<double> residual;
-  std::array<std::vector<double>, kParameters> jacobian;
+  std::array<std::vector<double>, kParameters> jacobian;  ///< of the active parameters; the others are not looked at
+  std::vector<int> active;
 };
 
-/// Geometric distances to a cylinder, cone or sphere and what a step of each parameter changes. A cylinder's half
-/// angle has its derivative too: where it is held, the caller holds it.
+/// Geometric distances to a cylinder, cone, sphere or torus and what a step of each of its parameters changes.
 void linearise(const Surface& surface, const FitPoints& points, Linearised& out);
 
 /// Least squares of the linearised residuals with Geman-McClure weights of width `mu` sigmas.
@@ -45,7 +47,7 @@ double robust_cost(const std::vector<double>& residual, double mu);
 /// A surface moved by a step of its parameters.
 Surface stepped(const Surface& surface, const Column& step);
 
-/// Freezes the parameters that a fit holds: unit rows and columns.
-void hold(NormalEquations& equations, const Surface& surface, const FitOptions& options);
+/// Freezes the parameters that are not active, and the radius where it is held: unit rows and columns.
+void hold(NormalEquations& equations, const std::vector<int>& active, bool hold_radius);
 
 }  // namespace tribin::segmentation_detail

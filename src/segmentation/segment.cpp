@@ -77,7 +77,8 @@ Primitive primitive_of(const Surfels& s, FoundSurface& found) {
     return p;
   }
   p.radius_mm = surface.radius;
-  if (p.type == PrimitiveType::sphere) return p;
+  p.minor_radius_mm = surface.minor_radius;
+  if (p.type == PrimitiveType::sphere || p.type == PrimitiveType::torus) return p;
   if (p.type == PrimitiveType::cylinder && p.axis.z() < 0) p.axis = -p.axis;
   if (p.type == PrimitiveType::cone) {
     if (surface.half_angle < 0) p.axis = -p.axis;  // from the apex into the cone
@@ -108,7 +109,7 @@ Primitive primitive_of(const Surfels& s, FoundSurface& found) {
 }  // namespace
 
 const char* name_of(PrimitiveType type) {
-  constexpr const char* kNames[] = {"plane", "cylinder", "cone", "sphere"};
+  constexpr const char* kNames[] = {"plane", "cylinder", "cone", "sphere", "torus"};
   return kNames[static_cast<int>(type)];
 }
 

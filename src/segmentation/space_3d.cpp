@@ -134,6 +134,49 @@ bool accepted(Scene& scene, const Indices& component, const FoundSurface& c, dou
   return true;
 }
 
+/// Tests for spheres and tori, which have no arc about an axis that says how much of them is seen.
+bool accepted_all_round(Scene& scene, const Indices& component, const FoundSurface& c, const Limits& limits) {
+  const Surface& surface = c.fit.surface;
+  if (area_of(scene.surfels, c.support) < limits.min_area_mm2 || c.fit.rms_sigma > kMaxRmsSigma) return false;
+  if (2 * kept(scene, component, c) < component.size()) return false;
+  if (smooth_rim_share(scene, c.support) > kMaxSmoothRim) return false;
+  if (static_cast<double>(c.support.size()) < kSurfelsPerSigma * c.fit.rms_sigma) return false;
+  if (std::sqrt(c.fit.covariance(4, 4)) > 0.1 * surface.radius) return false;
+  if (surface.type != PrimitiveType::torus) return true;
+  // Seven parameters follow any doubly curved patch: its residuals must be noise.
+  return std::sqrt(c.fit.covariance(5, 5)) < 0.1 * surface.minor_radius &&
+         residual_correlation(scene, c.support, surface) < 0.3;
+}
+
+/// The surface near `start` that explains most of a component, if it passes all tests.
+std::optional<FoundSurface> explain_from(Scene& scene, const Indices& component, const Surface& start,
+                                         const Limits& limits) {
+  if (!(start.radius > 0) || start.radius > limits.max_radius_mm) return std::nullopt;
+  const bool cone = start.type == PrimitiveType::cone;
+  const double angle = std::abs(start.half_angle);
+  if (cone && (angle < 3 * kDegree || angle > 80 * kDegree)) return std::nullopt;
+  FitOptions options;
+  options.start_mm = std::min(2.5, 0.15 * (start.type == PrimitiveType::torus ? start.minor_radius : start.radius));
+  options.cone = cone;
+  std::optional<FoundSurface> c = settle(scene, component, start, options, limits);
+  if (!c || std::abs(c->fit.surface.half_angle) > 80 * kDegree) return std::nullopt;  // a dented plane
+  if (cone && !tapers(c->fit)) return std::nullopt;                                   // find_cylinders' to take
+  if (start.type == PrimitiveType::sphere && scene.surfels.mesh != nullptr && is_ring(scene.surfels, c->support))
+    return std::nullopt;
+  c->arc = arc_of(scene.surfels, c->support, c->fit.surface);
+  const bool good =
+      cone ? accepted(scene, component, *c, c->arc, limits) : accepted_all_round(scene, component, *c, limits);
+  if (!good) return std::nullopt;
+  return c;
+}
+
+/// Bayesian information criterion of a component: misfit and parameters, correlated data counted as what they say.
+double bic_of(const Surfels& s, const Indices& component, const Fit& fit) {
+  const double inflation = correlation_inflation(s), count = static_cast<double>(component.size()) / inflation;
+  return capped_chi2(s, component, fit.surface, 4.0) / inflation +
+         parameters_of(fit.surface.type) * std::log(std::max(2.0, count));
+}
+
 }  // namespace
 
 void polish(const Scene& scene, FoundSurface& c) {
@@ -238,28 +281,20 @@ void find_cones_and_spheres(Scene& scene, const Limits& limits, std::vector<Foun
     for (Indices& component : pieces) {
       std::erase_if(component, [&](std::uint32_t i) { return !scene.free(i); });
       if (component.size() < least) continue;
-      const bool sphere = shape == SurfelShape::curved;
-      const Surface start = sphere ? sphere_from_normals(s, component) : cone_from_normals(s, component);
-      if (!(start.radius > 0) || start.radius > limits.max_radius_mm) continue;
-      if (!sphere && (std::abs(start.half_angle) < 3 * kDegree || std::abs(start.half_angle) > 80 * kDegree)) continue;
-      FitOptions options;
-      options.start_mm = std::min(2.5, 0.15 * start.radius);
-      options.cone = !sphere;
-      std::optional<FoundSurface> c = settle(scene, component, start, options, limits);
-      if (!c) continue;
-      if (std::abs(c->fit.surface.half_angle) > 80 * kDegree) continue;  // a dented plane
-      if (!sphere && !tapers(c->fit)) continue;                          // a cylinder: find_cylinders' to take
-      if (sphere && s.mesh != nullptr && is_ring(s, c->support)) continue;
-      const double arc = arc_of(s, c->support, c->fit.surface);
-      if (!sphere && !accepted(scene, component, *c, arc, limits)) continue;
-      if (sphere &&
-          (area_of(s, c->support) < limits.min_area_mm2 || c->fit.rms_sigma > kMaxRmsSigma ||
-           2 * kept(scene, component, *c) < component.size() || smooth_rim_share(scene, c->support) > kMaxSmoothRim ||
-           c->support.size() < kSurfelsPerSigma * c->fit.rms_sigma ||
-           std::sqrt(c->fit.covariance(4, 4)) > 0.1 * c->fit.surface.radius))
-        continue;
-      c->arc = arc;
-      take(scene, found, std::move(*c));
+      std::vector<Surface> starts;
+      if (shape == SurfelShape::ruled) starts.push_back(cone_from_normals(s, component));
+      if (shape == SurfelShape::curved) starts.push_back(sphere_from_normals(s, component));
+      // A CAD file says itself which of its faces are tori; a scan's rulings are those of a bend where it is wide.
+      if (s.mesh == nullptr) starts.push_back(torus_from_curvature(s, component));
+      std::optional<FoundSurface> best;
+      double best_bic = 1e300;
+      for (const Surface& start : starts) {
+        std::optional<FoundSurface> c = explain_from(scene, component, start, limits);
+        if (!c) continue;
+        const double bic = bic_of(s, component, c->fit);
+        if (bic < best_bic) best_bic = bic, best = std::move(c);
+      }
+      if (best) take(scene, found, std::move(*best));
     }
   }
 }

@@ -49,7 +49,8 @@ void find_by_great_circles(Scene& scene, const Limits& limits, HoughSpaces& spac
 /// in the gap. Planes stay apart: each is a face.
 void merge_pieces(Scene& scene, std::vector<FoundSurface>& found);
 
-/// What rulings do not explain: cones with wide angles and spheres, from components of curved surfels.
+/// What rulings do not explain: cones with wide angles, spheres and tori, from components of curved surfels; the type
+/// by the Bayesian information criterion.
 void find_cones_and_spheres(Scene& scene, const Limits& limits, std::vector<FoundSurface>& found);
 
 /// One component -> the cylinder (or cone) that explains most of it, if it passes all tests. \param axis near the

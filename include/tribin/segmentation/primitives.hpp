@@ -10,7 +10,8 @@
 
 namespace tribin {
 
-enum class PrimitiveType : std::uint8_t { plane, cylinder, cone, sphere };
+/// A torus is what fillets, bends of pipes and rings are: found and labelled, but no pose rests on it.
+enum class PrimitiveType : std::uint8_t { plane, cylinder, cone, sphere, torus };
 const char* name_of(PrimitiveType type);
 
 /// A circle fitted to a piece of boundary.
@@ -30,16 +31,18 @@ struct BoundaryLoop {
 
 /// One surface primitive. The covariance's parameters are (tilt about u, tilt about v [rad], shift along u, shift along
 /// v, radius [mm], half angle [rad]) with u, v of orthonormal_basis(axis); a plane has (tilt, tilt, offset along the
-/// axis in place 2); a sphere has its centre in places 0-2 and its radius in 4. Unused rows are 0.
+/// axis in place 2); a sphere has its centre in places 0-2 and its radius in 4; a torus has its minor radius in place 5
+/// and its shift along the axis nowhere. Unused rows are 0.
 struct Primitive {
   int id = 0;  ///< from 1, the place in Primitives
   PrimitiveType type = PrimitiveType::plane;
   Vec3 axis = Vec3::UnitZ();     ///< unit. Plane: normal towards the camera / outward. Cylinder: z >= 0. Cone: from the
                                  ///< apex into the cone
   Vec3 point = Vec3::Zero();     ///< mm. Plane: centre of the support. Cylinder: on the axis at mid-height. Cone: apex.
-                                 ///< Sphere: centre
+                                 ///< Sphere, torus: centre
   double offset_mm = 0;          ///< plane: dot(axis, x) = offset
-  double radius_mm = 0;          ///< cylinder, sphere
+  double radius_mm = 0;          ///< cylinder, sphere; torus: of the circle that the tube runs along
+  double minor_radius_mm = 0;    ///< torus: of the tube
   double half_angle = 0;         ///< cone [rad]
   double extent_min = 0;         ///< cylinder, cone: first place of the support along the axis, from `point` [mm]
   double extent_max = 0;         ///< last place
@@ -87,9 +90,9 @@ struct SegmentationOptions {
   bool boundaries = true;        ///< scan: trace the rims and holes of planes
 };
 
-/// Finds planes, cylinders, cones and spheres by going back and forth between IJK space, parameter space and 3-D space
-/// until nothing explainable is left.
-/// \source Barajas et al., section III-B; the votes, tests and fits are ours (docs/segmentation.md).
+/// Finds planes, cylinders, cones, spheres and tori by going back and forth between IJK space, parameter space and 3-D
+/// space until nothing explainable is left. \source Barajas et al., section III-B; the votes, tests and fits are ours
+/// (docs/segmentation.md).
 Primitives segment(const Surfels& surfels, const SegmentationOptions& options = {});
 
 /// Primitive id of each pixel (0 = none): the surfels' labels carried to the pixels within 3 local sigma.
