@@ -28,6 +28,9 @@ void add_normals(CLI::App& app, Context& context);
 void add_part(CLI::App& app, Context& context);
 void add_convert(CLI::App& app, Context& context);
 void add_simulate(CLI::App& app, Context& context);
+void add_calibrate(CLI::App& app, Context& context);
+void add_calibrate_hand_eye(CLI::App& group, Context& context);
+void add_calibrate_touch(CLI::App& group, Context& context);
 void add_bench(CLI::App& app, Context& context);
 
 // Shared by the commands (inputs.cpp).

@@ -20,7 +20,8 @@ using tribin::cli::Context;
 /// The chosen command, for the head of messages: "tribin locate".
 std::string name_of_command(const CLI::App& app) {
   std::string name = "tribin";
-  for (const CLI::App* command : app.get_subcommands()) name += " " + command->get_name();
+  const CLI::App* at = &app;
+  while (!at->get_subcommands().empty()) name += " " + (at = at->get_subcommands().front())->get_name();
   return name;
 }
 
@@ -59,6 +60,7 @@ int main(int argc, char** argv) {
   tribin::cli::add_part(app, context);
   tribin::cli::add_convert(app, context);
   tribin::cli::add_simulate(app, context);
+  tribin::cli::add_calibrate(app, context);
   tribin::cli::add_bench(app, context);
 
   constexpr int kBadOption = static_cast<int>(tribin::ErrorCode::bad_option);

@@ -17,7 +17,7 @@ import xml.etree.ElementTree
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 DATA = pathlib.Path(os.environ.get("TRIBIN_DATA", ROOT / "../shared/data"))
 SCENES = DATA / "scenes_dev"
-COMMANDS = ["locate", "segment", "normals", "part", "convert", "simulate", "bench"]
+COMMANDS = ["locate", "segment", "normals", "part", "convert", "simulate", "calibrate", "bench"]
 TRIBIN, WORK = sys.argv[1], pathlib.Path(sys.argv[2])
 
 
@@ -193,6 +193,77 @@ class SegmentCommand(unittest.TestCase):
         result = validated(self, "segment", out.stdout)
         self.assertTrue(any(p["type"] == "cylinder" for p in result["primitives"]))
         self.assertEqual(labels.read_bytes()[:8], b"\x89PNG\r\n\x1a\n")
+
+
+class CalibrateCommand(unittest.TestCase):
+    poses = ROOT / "examples/calibration/hand_eye_poses.json"
+    points = ROOT / "examples/calibration/touched_points.json"
+
+    def changed(self, source, change):
+        document = json.loads(source.read_text())
+        change(document)
+        path = WORK / "changed.json"
+        path.write_text(json.dumps(document))
+        return path
+
+    def test_hand_eye_names_what_is_wrong_with_the_example(self):
+        out = run("calibrate", "hand-eye", self.poses, "--json", "-")
+        self.assertEqual(out.returncode, 0, out.stderr)
+        self.assertIn("'4' and '11' are swapped", out.stderr)
+        result = validated(self, "hand_eye", out.stdout)
+        self.assertEqual((result["swapped"], result["outliers"]), ([["4", "11"]], ["4", "8", "11"]))
+        for found, truth in zip(result["base_from_camera"]["translation_mm"], (700, 100, 1300)):
+            self.assertLess(abs(found - truth), 1)
+        self.assertEqual(out.stdout, run("calibrate", "hand-eye", self.poses, "--json", "-").stdout)
+
+    def test_hand_eye_pairs_by_id_not_by_order(self):
+        shuffled = self.changed(self.poses, lambda d: (d["robot"].reverse(), d["camera"].pop(2)))
+        result = json.loads(run("calibrate", "hand-eye", shuffled, "--json", "-").stdout)
+        self.assertEqual(sum(map(len, result["unpaired"].values())), 1)
+        self.assertLessEqual({"4", "8", "11"} - set(result["unpaired"]["robot"]), set(result["outliers"]))
+
+    def test_touch_is_stamped_with_the_day(self):
+        out = run("calibrate", "touch", self.points, "--json", "-")
+        result = validated(self, "touch", out.stdout)
+        self.assertEqual((out.returncode, result["date"], len(result["points"])), (0, "2026-03-05", 10))
+        self.assertIn("rigid_error", [w["code"] for w in result["warnings"]])
+        self.assertEqual(json.loads(run("calibrate", "touch", self.points, "--date", "2024-02-29", "--json", "-").stdout)["date"],
+                         "2024-02-29")
+        undated = self.changed(self.points, lambda d: d.pop("date"))
+        before = time.strftime("%Y-%m-%d", time.gmtime())
+        stamped = json.loads(run("calibrate", "touch", undated, "--json", "-").stdout)["date"]
+        self.assertIn(stamped, (before, time.strftime("%Y-%m-%d", time.gmtime())))
+
+    def test_bad_input_is_one_sentence_with_its_code(self):
+        def pose(d): d["robot"][3]["pose"].pop()
+        def brand(d): d.update(convention="acme")
+        def twice(d): d["camera"][1]["id"] = d["camera"][0]["id"]
+        def few(d): d.update(camera=d["camera"][:2])
+        def metres(d):
+            for r in d["robot"]: r["pose"][:3] = [x / 1000 for x in r["pose"][:3]]
+        def matrix(d): d["camera"][0].pop("rotation_vector_rad"); d["camera"][0]["rotation"] = [[1, 0, 0], [0, 2, 0], [0, 0, 1]]
+        def mount(d): d.pop("mount")
+        def misspelt(d): d["robot"][0]["possse"] = 1
+        def parallel(d):
+            for r in d["robot"]: r["pose"][3:5] = [180, 0]
+        for change, code, words in [(pose, 3, "robot[3].pose"), (brand, 3, "kawasaki"), (twice, 3, "camera[1].id"),
+                                    (few, 4, "saw 2 pairs"), (metres, 5, "robot_unit"), (matrix, 3, "camera[0].rotation"),
+                                    (mount, 2, "--mount"), (misspelt, 3, "possse"), (parallel, 4, "parallel axes")]:
+            out = run("calibrate", "hand-eye", self.changed(self.poses, change))
+            self.assertEqual((out.returncode, out.stderr.count("\n")), (code, 1), out.stderr)
+            self.assertIn(words, out.stderr)
+            self.assertIn("calibrate hand-eye: ", out.stderr)
+            self.assertIn("changed.json", out.stderr)
+        def day(d): d.update(date="2026-02-30")
+        def line(d):
+            for i, p in enumerate(d["points"]): p["predicted_mm"] = [600 + 10 * i, 0, 0]
+        for change, code, words in [(day, 3, "date"), (line, 4, "one line"), (lambda d: d["points"][2].pop("touched_mm"), 3, "points[2]")]:
+            out = run("calibrate", "touch", self.changed(self.points, change))
+            self.assertEqual((out.returncode, out.stderr.count("\n")), (code, 1), out.stderr)
+            self.assertIn(words, out.stderr)
+        self.assertEqual(run("calibrate", "touch", self.points, "--date", "yesterday").returncode, 2)
+        self.assertEqual(run("calibrate").returncode, 2)
+        self.assertEqual(run("calibrate", "hand-eye", self.poses, "--mount", "hand").returncode, 2)
 
 
 if __name__ == "__main__":
