@@ -60,9 +60,13 @@ std::vector<Warning> hand_eye_warnings(const HandEyeFile& file, const HandEye& r
     out.push_back({"noisier_than_stated",
                    with("The residuals are %.1f times as large as the stated noise: the covariance is scaled to them.",
                         std::sqrt(result.variance_factor))});
-  const auto used = file.pairs.size() - result.outliers.size();
-  if (used < 12)
-    out.push_back({"few_pairs", with("%.0f pairs are in use; 12 to 15 are good.", static_cast<double>(used))});
+  const double used = static_cast<double>(file.pairs.size() - result.outliers.size());
+  const double good = file.target == HandEyeTarget::board ? 12 : 20, enough_to_tell = good == 12 ? 6 : 8;
+  if (used < good)
+    out.push_back({"few_pairs", with("%.0f pairs are in use; %.0f or more are good", used, good) +
+                                    (static_cast<double>(file.pairs.size()) < enough_to_tell
+                                         ? with(", and below %.0f a wrong one cannot be told.", enough_to_tell)
+                                         : std::string("."))});
   return out;
 }
 

@@ -159,6 +159,25 @@ TEST(HandEye, NamesOneSwapAndAnOutlier) {
   EXPECT_LE(quantile(mm, 0.5), 0.35);
 }
 
+TEST(HandEye, NamesASwapForEachMountTargetAndCount) {
+  for (CameraMount mount : {CameraMount::fixed, CameraMount::hand}) {
+    for (HandEyeTarget target : {HandEyeTarget::board, HandEyeTarget::sphere}) {
+      int good_left_out = 0;
+      for (int poses : {target == HandEyeTarget::board ? 6 : 8, 12, 60}) {
+        for (unsigned seed = 1; seed <= 10; ++seed) {
+          SCOPED_TRACE(std::to_string(poses) + " poses, seed " + std::to_string(seed));
+          HandEyeSimulation truth = simulate_hand_eye(seed, {.mount = mount, .poses = poses});
+          swap_cameras(truth, 0, 3);
+          const HandEye found = calibrate_hand_eye(truth.pairs, {.mount = mount, .target = target});
+          EXPECT_EQ(found.swapped, (std::vector<std::pair<int, int>>{{0, 3}}));
+          good_left_out += static_cast<int>(found.outliers.size()) - 2;
+        }
+      }
+      EXPECT_LE(good_left_out, 2);
+    }
+  }
+}
+
 TEST(HandEye, RealNoiseAboveTheStatedOneIsSaidAndCostsNoGoodPair) {
   int said = 0, outliers = 0;
   for (unsigned seed = 1; seed <= 50; ++seed) {
