@@ -27,6 +27,8 @@ void add_segment(CLI::App& app, Context& context);
 void add_normals(CLI::App& app, Context& context);
 void add_part(CLI::App& app, Context& context);
 void add_convert(CLI::App& app, Context& context);
+void add_patterns(CLI::App& app, Context& context);
+void add_scan(CLI::App& app, Context& context);
 void add_simulate(CLI::App& app, Context& context);
 void add_calibrate(CLI::App& app, Context& context);
 void add_calibrate_hand_eye(CLI::App& group, Context& context);

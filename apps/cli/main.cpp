@@ -59,6 +59,8 @@ int main(int argc, char** argv) {
   tribin::cli::add_normals(app, context);
   tribin::cli::add_part(app, context);
   tribin::cli::add_convert(app, context);
+  tribin::cli::add_patterns(app, context);
+  tribin::cli::add_scan(app, context);
   tribin::cli::add_simulate(app, context);
   tribin::cli::add_calibrate(app, context);
   tribin::cli::add_bench(app, context);

@@ -138,9 +138,8 @@ void settle_by_search(const Job<T>& job, const AxisPlan& axis, int u, int v, int
   for (int k = 0; k < axis.orders; ++k) {
     std::fill_n(w.residual, n, 0.0f);
     for (int s = 0; s < singles; ++s) {
-      const double b = 2 * kPi * k * first / axis.singles[s].period;
-      add_order_residual(w.difference[s], w.modulation[0], w.cosine[s], w.sine[s], static_cast<float>(std::cos(b)),
-                         static_cast<float>(std::sin(b)), n, w.residual);
+      const auto& [cosine, sine] = axis.singles[s].turns[k];
+      add_order_residual(w.difference[s], w.modulation[0], w.cosine[s], w.sine[s], cosine, sine, n, w.residual);
     }
     keep_best_order(w.residual, static_cast<float>(k), n, w.order, w.best, w.second);
   }
@@ -179,24 +178,9 @@ void decode_lanes(const Job<T>& job, const AxisPlan& axis, bool first, int u, in
   else
     settle_by_search(job, axis, u, v, n, w);
 
-  float* x = (axis.axis == PatternAxis::column ? out.column : out.row).row(v) + u;
-  std::uint8_t* reason = out.invalid_reason.row(v) + u;
-  std::uint8_t* modulation = out.modulation.row(v) + u;
-  std::uint8_t* brightness = out.brightness.row(v) + u;
-  for (int i = 0; i < n; ++i) {
-    const float m = w.modulation[0][i];
-    Invalid why = Invalid::measured;
-    why = w.differs[i] > 0 ? Invalid::order_inconsistent : why;
-    why = w.doubt[i] > 0 ? Invalid::uncertain_bit : why;
-    why = m < job.dark ? Invalid::dark : why;
-    why = w.saturated[i] > 0 ? Invalid::saturated : why;
-    x[i] = why == Invalid::measured ? w.x[i] - 0.5f : kNaN;  // X = 0.5 is the middle of pixel 0
-    if (first) {
-      reason[i] = static_cast<std::uint8_t>(why);
-      modulation[i] = static_cast<std::uint8_t>(std::min(255.0f, m + 0.5f));
-      brightness[i] = static_cast<std::uint8_t>(std::clamp(w.mean[i] + 0.5f, 0.0f, 255.0f));
-    }
-  }
+  finish(w.x, w.doubt, w.differs, w.modulation[0], w.saturated, w.mean, job.dark, n,
+         (axis.axis == PatternAxis::column ? out.column : out.row).row(v) + u, out.invalid_reason.row(v) + u,
+         first ? out.modulation.row(v) + u : nullptr, out.brightness.row(v) + u);
 }
 
 /// Settles the orders of a row whose set has no half-stripe words. Pixels in the middle half of a fringe have their

@@ -129,7 +129,7 @@ AxisPlan plan_axis(const std::vector<Pattern>& patterns, PatternAxis axis, const
       weigh(fringe, name);
       plan.fringes.push_back(fringe);
     } else {
-      for (const PhaseImage& image : fringe.images) plan.singles.push_back({image.image, period, image.shift});
+      for (const PhaseImage& image : fringe.images) plan.singles.push_back({image.image, period, image.shift, {}});
     }
   }
   const std::string along = std::string(name_of(axis)) + " patterns ";
@@ -145,6 +145,11 @@ AxisPlan plan_axis(const std::vector<Pattern>& patterns, PatternAxis axis, const
     for (const SingleImage& s : plan.singles)
       coarsest = std::max(coarsest, s.period * plan.fringes[0].period / std::abs(s.period - plan.fringes[0].period));
     plan.orders = static_cast<int>(std::lround(coarsest / plan.fringes[0].period));
+    for (SingleImage& s : plan.singles)
+      for (int k = 0; k < plan.orders; ++k) {
+        const double turn = 2 * kPi * k * plan.fringes[0].period / s.period;
+        s.turns.emplace_back(static_cast<float>(std::cos(turn)), static_cast<float>(std::sin(turn)));
+      }
     return plan;
   }
   if (plan.fringes.size() < 2)

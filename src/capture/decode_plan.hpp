@@ -1,5 +1,6 @@
 #pragma once
 
+#include <utility>
 #include <vector>
 
 #include "capture/fringe_lanes.hpp"
@@ -36,6 +37,7 @@ struct Wave {
 struct SingleImage {
   int image = 0;
   double period = 0, shift = 0;
+  std::vector<std::pair<float, float>> turns;  ///< cosine and sine of its phase after k fringes of the first frequency
 };
 
 /// How the patterns along one axis are decoded: Gray code where `bits` is filled, a chain of beats where `chain` is,

@@ -1,8 +1,10 @@
 #include "capture/fringe_lanes.hpp"
 
 #include <cmath>
+#include <limits>
 
 #include "tribin/core/vector_levels.hpp"
+#include "tribin/scan/scan.hpp"
 
 // Straight loops over lanes, without branches, calls or sums across lanes: each is one vector loop at each SIMD level,
 // and a lane does the same operations in the same order at all of them.
@@ -123,15 +125,19 @@ TRIBIN_VECTOR_LEVELS void settle_gray(const GraySettings& p, const GrayLanes& co
     const float off = x[i] * words - (w + 0.5f);
     differs[i] = (off < 0 ? -off : off) > 0.85f ? 1.0f : 0.0f;  // half a word and a third of the next
   }
+  // The bit whose edge is near may be anything; any other one must be settled.
+  alignas(64) std::int32_t allowed[kLanes];
+  for (int i = 0; i < n; ++i) {
+    const float place = x[i] * words, edge = floored(place + 0.5f), off = place - edge;
+    const std::int32_t e = static_cast<std::int32_t>(edge), bit = e & -e;
+    allowed[i] = (off < 0 ? -off : off) < 0.35f ? bit : 0;
+  }
   for (int b = 0; b < p.bits; ++b) {
     const std::int32_t mask = 1 << b;
     const float* __restrict d = code.difference[b];
     for (int i = 0; i < n; ++i) {
-      const float place = x[i] * words, edge = floored(place + 0.5f), off = place - edge;
-      const std::int32_t e = static_cast<std::int32_t>(edge);
-      const bool near = ((off < 0 ? -off : off) < 0.35f) & ((e & -e) == mask);
       const float size = d[i] < 0 ? -d[i] : d[i];
-      doubt[i] += (size < p.weak) & !near ? 1.0f : 0.0f;
+      doubt[i] += (size < p.weak) & (allowed[i] != mask) ? 1.0f : 0.0f;
     }
   }
 }
@@ -192,6 +198,36 @@ TRIBIN_VECTOR_LEVELS void keep_best_order(const float* __restrict residual, floa
     second[i] = other < s ? other : s;
     best_order[i] = r < b ? order : best_order[i];
     best[i] = r < b ? r : b;
+  }
+}
+
+TRIBIN_VECTOR_LEVELS void finish(const float* __restrict x, const float* __restrict doubt,
+                                 const float* __restrict differs, const float* __restrict modulation,
+                                 const float* __restrict saturated, const float* __restrict mean, float dark, int n,
+                                 float* __restrict column, std::uint8_t* __restrict reason,
+                                 std::uint8_t* __restrict modulation_out, std::uint8_t* __restrict brightness_out) {
+  constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+  constexpr std::int32_t kInconsistent = static_cast<std::int32_t>(Invalid::order_inconsistent),
+                         kUncertain = static_cast<std::int32_t>(Invalid::uncertain_bit),
+                         kDark = static_cast<std::int32_t>(Invalid::dark),
+                         kSaturated = static_cast<std::int32_t>(Invalid::saturated);
+  alignas(64) std::int32_t why[kLanes];
+  for (int i = 0; i < n; ++i) {
+    std::int32_t w = differs[i] > 0 ? kInconsistent : 0;
+    w = doubt[i] > 0 ? kUncertain : w;
+    w = modulation[i] < dark ? kDark : w;
+    w = saturated[i] > 0 ? kSaturated : w;
+    why[i] = w;
+    const float place = x[i] - 0.5f;
+    column[i] = w == 0 ? place : kNaN;
+  }
+  if (!modulation_out) return;
+  for (int i = 0; i < n; ++i) reason[i] = static_cast<std::uint8_t>(why[i]);
+  for (int i = 0; i < n; ++i) {
+    const std::int32_t m = static_cast<std::int32_t>(modulation[i] + 0.5f);
+    const std::int32_t b = static_cast<std::int32_t>(mean[i] + 0.5f), positive = b > 0 ? b : 0;
+    modulation_out[i] = static_cast<std::uint8_t>(m < 255 ? m : 255);
+    brightness_out[i] = static_cast<std::uint8_t>(positive < 255 ? positive : 255);
   }
 }
 

@@ -67,4 +67,10 @@ void add_order_residual(const float* difference, const float* modulation, const 
 /// Keeps the best order, its residual and the second best residual.
 void keep_best_order(const float* residual, float order, int n, float* best_order, float* best, float* second);
 
+/// What is written of n pixels: x - 0.5 (X = 0.5 is the middle of pixel 0) or NaN, the reason, and, where they are not
+/// null, modulation and brightness rounded to grey levels. Saturated goes before dark, dark before the code's doubts.
+void finish(const float* x, const float* doubt, const float* differs, const float* modulation, const float* saturated,
+            const float* mean, float dark, int n, float* column, std::uint8_t* reason, std::uint8_t* modulation_out,
+            std::uint8_t* brightness_out);
+
 }  // namespace tribin::capture_detail

@@ -43,7 +43,7 @@ void add_gray(std::vector<Pattern>& out, PatternAxis axis, int size, double peri
 std::vector<double> close_periods(int size, double finest, bool single_images) {
   const double span = 1.25 * size;  // a quarter more: at 6 sd of usable phases, noise at the borders wraps around
   const double count = std::max(4.0, span / finest);
-  int waves = 3;
+  int waves = single_images ? 5 : 3;
   while (std::pow(count, 1.0 / (waves - 1)) > (single_images ? 2.2 : 5)) ++waves;
   const double ratio = std::pow(count, 1.0 / (waves - 1));
   std::vector<double> periods{span / count};

@@ -17,7 +17,7 @@ import xml.etree.ElementTree
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 DATA = pathlib.Path(os.environ.get("TRIBIN_DATA", ROOT / "../shared/data"))
 SCENES = DATA / "scenes_dev"
-COMMANDS = ["locate", "segment", "normals", "part", "convert", "simulate", "calibrate", "bench"]
+COMMANDS = ["locate", "segment", "normals", "part", "convert", "patterns", "scan", "simulate", "calibrate", "bench"]
 TRIBIN, WORK = sys.argv[1], pathlib.Path(sys.argv[2])
 
 
@@ -122,6 +122,37 @@ class PartCommand(unittest.TestCase):
             self.assertNotIn(forbidden, page)
         validated(self, "part", (dir / "report.json").read_text())
         self.assertEqual(sorted(p.name for p in dir.iterdir()), ["index.html", "report.json"])
+
+
+class CaptureCommands(unittest.TestCase):
+    def test_a_camera_that_is_the_projector_needs_another_place(self):
+        frames = WORK / "patterns"
+        shutil.rmtree(frames, ignore_errors=True)
+        out = run("patterns", "--size", "320x64", "--set", "heterodyne", "-o", frames, "--camera", "eye")
+        self.assertEqual(out.returncode, 0, out.stderr)
+        self.assertEqual(len(list(frames.glob("*.png"))), len(json.loads((frames / "frames.json").read_text())["cameras"][0]["patterns"]))
+        camera = {"name": "eye", "width": 320, "height": 64, "K": [400, 0, 160, 0, 400, 32, 0, 0, 1]}
+        # A camera turned and moved against the projector, whose frames are the projector's own pictures: a surface at
+        # which each pixel meets its own column.
+        beside = dict(camera, name="projector", K=[400, 0, 240, 0, 400, 32, 0, 0, 1],
+                      rig_from_camera={"rotation": [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "translation_mm": [100, 0, 0]})
+        (WORK / "rig.json").write_text(json.dumps({"cameras": [camera], "projector": beside}))
+        scan, report = WORK / "scan.pcd", WORK / "scan_report"
+        out = run("scan", frames, "--calibration", WORK / "rig.json", "-o", scan, "--report", report)
+        self.assertEqual(out.returncode, 0, out.stderr)
+        self.assertIn("points", out.stdout)
+        self.assertNotIn("http", (report / "index.html").read_text())
+        out = run("convert", scan, WORK / "scan.ply")
+        self.assertEqual(out.returncode, 0, out.stderr)
+        for arguments, code, words in [
+            (["scan", frames, "--calibration", WORK / "none.json", "-o", scan], 3, "none.json"),
+            (["patterns", "--size", "big", "-o", frames], 2, "WIDTHxHEIGHT"),
+            (["patterns", "--steps", "2", "-o", frames], 2, "3..8"),
+            (["patterns", "--set", "magic", "-o", frames], 2, "heterodyne"),
+        ]:
+            out = run(*arguments)
+            self.assertEqual((out.returncode, out.stderr.count("\n")), (code, 1), out.stderr)
+            self.assertIn(words, out.stderr)
 
 
 @unittest.skipUnless(SCENES.exists(), "SKIPPED: no shared data")
