@@ -4,6 +4,7 @@
 
 #include "segmentation/boundary.hpp"
 #include "segmentation/cad_faces.hpp"
+#include "segmentation/consensus.hpp"
 #include "segmentation/loose_points.hpp"
 #include "segmentation/spaces.hpp"
 #include "tribin/core/error.hpp"
@@ -133,16 +134,21 @@ void segmentation_detail::explain(Scene& scene, const Limits& limits, HoughSpace
   if (surfels.mesh == nullptr) find_by_great_circles(scene, limits, spaces, found);
 }
 
-Primitives segment(const Surfels& surfels, const SegmentationOptions& options) {
+Primitives segment(const Surfels& given, const SegmentationOptions& options) {
   Primitives out;
+  const Scene whole(given);
+  const Limits limits = limits_of(given, whole, options);
+  const bool points_alone = given.point_set != nullptr && noise_shows(whole);
+  const Surfels surer = points_alone ? with_common_noise(given, limits) : Surfels();
+  const Surfels& surfels = points_alone ? surer : given;
   Scene scene(surfels);
-  const Limits limits = limits_of(surfels, scene, options);
   fill_ijk(surfels, out.spaces);
 
   std::vector<FoundSurface> found;
   if (surfels.mesh != nullptr) take_cad_faces(scene, found);
 
-  explain(scene, limits, out.spaces, found);
+  if (points_alone) explain_by_consensus(scene, limits, found);
+  if (!points_alone) explain(scene, limits, out.spaces, found);
   if (surfels.point_set != nullptr) explain_rest(scene, limits, out.spaces, found);
 
   if (surfels.mesh == nullptr) merge_pieces(scene, found);
