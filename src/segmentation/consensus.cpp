@@ -77,11 +77,6 @@ Indices grow_inside(Scene& scene, const Surface& surface, const Indices& from) {
   return out;
 }
 
-int parameters_of(PrimitiveType type) {
-  constexpr int kParametersOf[] = {3, 5, 6, 4};  // in the order of PrimitiveType
-  return kParametersOf[static_cast<int>(type)];
-}
-
 /// What a surface saves, in nats: each point against being unexplained, less the parameters' price.
 double gain_of(const Surfels& s, const Indices& support, const Surface& surface) {
   double sum = 0;
@@ -92,7 +87,7 @@ double gain_of(const Surfels& s, const Indices& support, const Surface& surface)
   const double n = std::max<double>(2, static_cast<double>(support.size()));
   // A richer type is called so where it is proven by 3 sigma: many bands of a cylinder are nearly those of a sphere.
   constexpr double kProof = 0.5 * 3 * 3;
-  constexpr int kRichness[] = {0, 1, 2, 2};  // in the order of PrimitiveType
+  constexpr int kRichness[] = {0, 1, 2, 2, 2};  // in the order of PrimitiveType
   return sum - 0.5 * parameters_of(surface.type) * std::log(n) - kProof * kRichness[static_cast<int>(surface.type)];
 }
 
