@@ -97,6 +97,7 @@ Triangulated triangulate(const Rig& rig, const Decoded& decoded) {
   const IdealView view = undistorted_view(camera);
   const ViewImage seen = resample(decoded, camera, view);
   Triangulated out = start(camera, view, seen);
+  out.scan.warnings = decoded.warnings;
   Scan& scan = out.scan;
   const Pose projector_from_view = rig.projector->rig_from_camera.inverse() * out.rig_from_scan;
   const double noise = decoded.column_noise * std::sqrt(seen.noise_share);
@@ -139,6 +140,8 @@ Triangulated triangulate(const Rig& rig, const Decoded& first, const Decoded& se
   const auto [view_a, view_b] = rectified_views(a, b);
   const ViewImage seen_a = resample(first, a, view_a), seen_b = resample(second, b, view_b);
   Triangulated out = start(a, view_a, seen_a);
+  out.scan.warnings = first.warnings;
+  out.scan.warnings.insert(out.scan.warnings.end(), second.warnings.begin(), second.warnings.end());
   Scan& scan = out.scan;
   const StereoMatch match = match_columns(seen_a, seen_b);
   // The second camera on the first view's x axis.

@@ -40,6 +40,7 @@ struct Decoded {
   double image_noise = 0;              ///< that was used [grey levels]
   double column_noise = 0;             ///< sd of a column [px] at modulation 1: divide by the modulation
   double row_noise = 0;                ///< the same of rows
+  std::vector<std::string> warnings;
 
   int width() const { return invalid_reason.width; }
   int height() const { return invalid_reason.height; }
