@@ -133,9 +133,7 @@ int run(const Options& options, const Context& context) {
   return 0;
 }
 #else
-int run(const Options&, const Context&) {
-  throw Error(ErrorCode::bad_option, "the simulated camera is not built in; install libembree-dev and build again");
-}
+int run(const Options&, const Context&) { refuse_without_simulation(); }
 #endif
 
 }  // namespace

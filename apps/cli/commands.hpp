@@ -51,6 +51,13 @@ struct PartArgument {
 /// \throws Error bad_option for two equal names.
 std::vector<PartArgument> part_arguments(const std::vector<std::string>& arguments);
 
+/// For commands that simulate, where the simulated camera is not built in.
+/// \throws Error bad_option, naming the package.
+[[noreturn]] void refuse_without_simulation();
+
+/// The arguments SCAN, --camera and --scan-unit of commands that take scans and loose points alike.
+void add_any_scan(CLI::App* command, std::string& scan, std::string& camera, std::string& unit);
+
 /// --no-cache, for commands that compile parts.
 void add_no_cache(CLI::App* command, bool& no_cache);
 

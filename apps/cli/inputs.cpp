@@ -49,6 +49,18 @@ std::vector<PartArgument> part_arguments(const std::vector<std::string>& argumen
   return out;
 }
 
+void refuse_without_simulation() {
+  throw Error(ErrorCode::bad_option, "the simulated camera is not built in; install libembree-dev and build again");
+}
+
+void add_any_scan(CLI::App* command, std::string& scan, std::string& camera, std::string& unit) {
+  command
+      ->add_option("SCAN", scan, "Scan: PCD, PLY, depth PNG or TIFF with camera.json, NPY; loose points too, also XYZ")
+      ->required();
+  command->add_option("--camera", camera, "Camera file of a depth image")->type_name("FILE");
+  command->add_option("--scan-unit", unit, "Unit of clouds: mm, m, auto")->type_name("U");
+}
+
 void add_no_cache(CLI::App* command, bool& no_cache) {
   command->add_flag("--no-cache", no_cache, "Compile the CAD anew: no kept part is used, and none is kept");
 }

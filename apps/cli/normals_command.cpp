@@ -81,15 +81,10 @@ void add_normals(CLI::App& app, Context& context) {
   CLI::App* command =
       add_command(app, context, "normals", "Write the points of a scan or cloud with their surface normals",
                   "tribin normals bin.pcd -o normals.ply");
-  command
-      ->add_option("SCAN", options->scan,
-                   "Scan: PCD, PLY, depth PNG or TIFF with camera.json, NPY; loose points too, also XYZ")
-      ->required();
+  add_any_scan(command, options->scan, options->camera, options->scan_unit);
   command->add_option("-o", options->out, "PLY to write: every point, with the normal 0 0 0 where it stands alone")
       ->required()
       ->type_name("FILE.ply");
-  command->add_option("--camera", options->camera, "Camera file of a depth image")->type_name("FILE");
-  command->add_option("--scan-unit", options->scan_unit, "Unit of clouds: mm, m, auto")->type_name("U");
   command->add_option("--method", options->method, "inverse_depth (default), or tangent_mask: the paper's")
       ->check(CLI::IsMember({"inverse_depth", "tangent_mask"}))
       ->type_name("M");

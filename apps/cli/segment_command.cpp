@@ -93,16 +93,11 @@ void add_segment(CLI::App& app, Context& context) {
   CLI::App* command =
       add_command(app, context, "segment", "Find the planes, cylinders, cones and spheres of a scan or of loose points",
                   "tribin segment bin.pcd --radii 65,28 --json primitives.json --labels labels.png");
-  command
-      ->add_option("SCAN", options->scan,
-                   "Scan: PCD, PLY, depth PNG or TIFF with camera.json, NPY; loose points too, also XYZ")
-      ->required();
-  command->add_option("--camera", options->camera, "Camera file of a depth image")->type_name("FILE");
+  add_any_scan(command, options->scan, options->camera, options->scan_unit);
   command->add_option("--radii", options->radii_mm, "Radii to expect [mm], with commas")
       ->delimiter(',')
       ->check(CLI::PositiveNumber)
       ->type_name("R,R,...");
-  command->add_option("--scan-unit", options->scan_unit, "Unit of clouds: mm, m, auto")->type_name("U");
   command->add_option("--json", options->json, "Write the result as JSON; - is stdout")->type_name("OUT|-");
   command
       ->add_option("--labels", options->labels,

@@ -37,10 +37,6 @@ std::vector<bool> background_flags(const SceneFeatures& scene, const Part& part)
   return background;
 }
 
-}  // namespace
-
-namespace {
-
 /// Local sd of z at a cell [mm].
 double local_sigma(const Surfels& surfels, std::size_t cell) {
   const Image<float>& tiles = surfels.local_sigma_mm;

@@ -45,35 +45,30 @@ void check(const PrimitiveSceneOptions& options, unsigned seed) {
   EXPECT_LT(std::sqrt(place / places), 2.0);
 }
 
-TEST(PrimitiveScenes, CylindersAtTheirBound) {
-  unsigned seed = 1;
+/// The same kind of scene at little and much noise, white and correlated.
+void check_all_noises(PrimitiveSceneOptions options, unsigned seed) {
+  options.width = 720;
+  options.height = 480;
   for (double sigma : {0.05, 0.2})
     for (double correlation : {0.0, 1.5}) {
       SCOPED_TRACE(seed);
-      PrimitiveSceneOptions options;
-      options.width = 720;
-      options.height = 480;
       options.sigma_mm = sigma;
       options.correlation_px = correlation;
-      options.cylinders = 8;
       check(options, seed++);
     }
 }
 
+TEST(PrimitiveScenes, CylindersAtTheirBound) {
+  PrimitiveSceneOptions options;
+  options.cylinders = 8;
+  check_all_noises(options, 1);
+}
+
 TEST(PrimitiveScenes, ConesAndSpheresAtTheirBound) {
-  unsigned seed = 11;
-  for (double sigma : {0.05, 0.2})
-    for (double correlation : {0.0, 1.5}) {
-      SCOPED_TRACE(seed);
-      PrimitiveSceneOptions options;
-      options.width = 720;
-      options.height = 480;
-      options.sigma_mm = sigma;
-      options.correlation_px = correlation;
-      options.cylinders = 0;
-      options.cones = options.spheres = 5;
-      check(options, seed++);
-    }
+  PrimitiveSceneOptions options;
+  options.cylinders = 0;
+  options.cones = options.spheres = 5;
+  check_all_noises(options, 11);
 }
 
 }  // namespace
