@@ -77,6 +77,7 @@ void Canvas::draw(const ShadedSurface& s) {
       depth(u, v) = z;
       const Vec3 normal = (w0 * n[0] + w1 * n[1] + w2 * n[2]).normalized();
       indices(u, v) = index_of(s.materials[t], shade_of(normal) + tint, step);
+      ids(u, v) = s.ids.empty() ? std::uint16_t{0} : s.ids[t];
     });
   }
 }

@@ -18,6 +18,7 @@ struct ShadedSurface {
   std::vector<Material> materials;  ///< of the triangles
   std::vector<std::uint8_t> steps;  ///< of the triangles, for Material::height; may be empty
   std::vector<float> tints;         ///< of the triangles: added to the shade; may be empty
+  std::vector<std::uint16_t> ids;   ///< of the triangles: the primitive that each shows, 0 = none; may be empty
 };
 
 /// Parallel projection: x right, y down, z away from the viewer.
@@ -42,8 +43,10 @@ struct Canvas {
   View view;
   Image<std::uint8_t> indices;
   Image<float> depth;
+  Image<std::uint16_t> ids;  ///< primitive in each pixel, 0 = none
 
-  explicit Canvas(const View& v) : view(v), indices(v.width, v.height, 0), depth(v.width, v.height, 1e30f) {}
+  explicit Canvas(const View& v)
+      : view(v), indices(v.width, v.height, 0), depth(v.width, v.height, 1e30f), ids(v.width, v.height, 0) {}
   void draw(const ShadedSurface& surface);
   /// A line in space, `width_px` wide, where it is nearer than the depth buffer + slack_mm; it leaves the buffer alone.
   void line(const Vec3& a, const Vec3& b, Material material, double width_px, double slack_mm);

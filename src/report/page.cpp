@@ -1,4 +1,5 @@
 #include "report/html.hpp"
+#include "report/links.hpp"
 #include "report/palette.hpp"
 #include "report/spaces.hpp"
 
@@ -58,6 +59,9 @@ figure .none{padding:16px;color:var(--text-3);font-size:12px;line-height:16px;te
 .dot{fill:none;stroke-linecap:round}.ring{fill:none;stroke-width:1.6}.ring.plane{stroke:var(--plane)}.ring.cylinder{stroke:var(--cylinder)}.twin{stroke-dasharray:3 3}
 .mark{font-size:10px;font-weight:600;fill:var(--text);paint-order:stroke;stroke:var(--surface);stroke-width:3px;stroke-linejoin:round}
 .circle{fill:none;stroke-width:1.8}.circle.cylinder{stroke:var(--cylinder)}.circle.cone{stroke:var(--cone)}.circle-halo{fill:none;stroke:var(--surface);stroke-width:3.6;stroke-opacity:.8}
+.links{position:absolute;inset:0;width:100%;height:100%}.links path{fill:transparent;stroke:none;stroke-linejoin:round}[data-k]{cursor:pointer}
+.links path.on{stroke:var(--text);stroke-width:1.6;filter:drop-shadow(0 0 1px var(--surface)) drop-shadow(0 0 1px var(--surface))}.ring.on{stroke-width:3.4}.circle.on{stroke-width:4}.lit .circle:not(.on),.lit .ring:not(.on),.lit .dot{opacity:.4}tr.on{background:var(--sunken);box-shadow:inset 3px 0 var(--accent)}
+.switch{display:inline-flex;border:1px solid var(--line);border-radius:6px;overflow:hidden;margin:4px 0}.switch button{font:inherit;font-size:12px;line-height:16px;padding:6px 12px;border:0;background:var(--surface);color:var(--text-2);cursor:pointer}.switch button[aria-pressed=true]{background:var(--accent);color:var(--surface)}
 .axis{font-size:10px;font-weight:600}.a0{fill:var(--ax)}.a1{fill:var(--ay)}.a2{fill:var(--az)}
 .rail{width:100px;height:14px;display:block}.rail rect{fill:var(--sunken)}.rail .ticks{stroke:var(--line-2);stroke-width:1.2}.rail .bar{stroke:var(--text-2);stroke-width:3}.rail circle{fill:var(--text)}.rail.bad circle{fill:var(--bad)}.rail.bad .bar{stroke:var(--bad)}
 .lg{display:grid;grid-template-columns:190px 1fr 92px 92px;gap:0 10px;font-size:13px;padding:10px 12px;align-items:center}.lg>*{padding:3px 0}.lg .hd{font-size:12px;color:var(--text-3);text-align:right}.lg .num{text-align:right;white-space:nowrap}
@@ -66,7 +70,8 @@ code,pre{font:12px/18px "JetBrains Mono",ui-monospace,"DejaVu Sans Mono",monospa
 .foot{margin-top:30px;border-top:1px solid var(--line);padding-top:10px;font-size:12px;line-height:18px;color:var(--text-3);overflow-wrap:anywhere}
 @media (max-width:1000px){.doc{padding:20px 24px}.two{grid-template-columns:1fr}.lg{grid-template-columns:150px 1fr 80px 80px}.pics{grid-template-columns:repeat(auto-fill,minmax(190px,1fr))}}
 @page{size:A4;margin:12mm}
-@media print{body{background:#fff;font-size:11px;line-height:16px}.doc{max-width:none;padding:0}figure,.box,h2,h3,tr{break-inside:avoid}h2,h3{break-after:avoid}nav{display:none}td,th{font-size:10px;padding:4px 5px}.two{grid-template-columns:1fr}section{margin-top:18px}figcaption{font-size:9.5px;line-height:12px}.chip,.cls,.globe,.ramp,.tr i,.warning,pre{print-color-adjust:exact;-webkit-print-color-adjust:exact}}
+@media screen{.off{display:none}}
+@media print{.switch{display:none}body{background:#fff;font-size:11px;line-height:16px}.doc{max-width:none;padding:0}figure,.box,h2,h3,tr{break-inside:avoid}h2,h3{break-after:avoid}nav{display:none}td,th{font-size:10px;padding:4px 5px}.two{grid-template-columns:1fr}section{margin-top:18px}figcaption{font-size:9.5px;line-height:12px}.chip,.cls,.globe,.ramp,.tr i,.warning,pre{print-color-adjust:exact;-webkit-print-color-adjust:exact}}
 )css";
 
 /// The vote colours: magma, turned round on light pages so that "none" is the paper's colour.
@@ -112,7 +117,8 @@ std::string page(const std::string& title, const std::string& verdict, const std
   out += "</nav>\n" + body;
   out +=
       "<div class=\"foot\">This page holds everything it shows and loads nothing from the network. Written by "
-      "tribin " TRIBIN_VERSION ".</div>\n</main></body></html>\n";
+      "tribin " TRIBIN_VERSION ".</div>\n</main>\n" +
+      link_script() + "</body></html>\n";
   return out;
 }
 

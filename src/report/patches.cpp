@@ -21,7 +21,7 @@ struct Chart {
     Vec3 towards = middle - p.point;
     if (p.type == PrimitiveType::sphere) axis = towards.normalized();
     orthonormal_basis(axis, u, v);
-    if (p.type == PrimitiveType::cylinder || p.type == PrimitiveType::cone) {
+    if (p.type == PrimitiveType::cylinder || p.type == PrimitiveType::cone || p.type == PrimitiveType::torus) {
       towards -= axis * axis.dot(towards);
       if (towards.norm() > 1e-9) u = towards.normalized(), v = axis.cross(u);
       scale = p.radius_mm;
@@ -44,6 +44,8 @@ struct Chart {
         const double turn = scale * std::atan2(std::hypot(a, b), c), length = std::hypot(a, b);
         return length > 1e-12 ? Vec2(a / length * turn, b / length * turn) : Vec2(0, 0);
       }
+      case PrimitiveType::torus:  // round the axis, and round the tube from its outside
+        return {scale * std::atan2(b, a), p.minor_radius_mm * std::atan2(c, std::hypot(a, b) - p.radius_mm)};
     }
     return {0, 0};
   }
@@ -66,6 +68,12 @@ struct Chart {
         const Vec2 side = turn > 1e-12 ? Vec2(at / at.norm()) : Vec2(0, 0);
         return nearest_on(
             p, p.point + p.radius_mm * (std::sin(turn) * (side.x() * u + side.y() * v) + std::cos(turn) * axis));
+      }
+      case PrimitiveType::torus: {
+        const double t = at.x() / scale, tube = at.y() / p.minor_radius_mm;
+        const Vec3 out = std::cos(t) * u + std::sin(t) * v;
+        return nearest_on(p, p.point + (p.radius_mm + p.minor_radius_mm * std::cos(tube)) * out +
+                                 p.minor_radius_mm * std::sin(tube) * axis);
       }
     }
     return {};
@@ -122,6 +130,7 @@ void add_patch(const Primitive& p, const std::vector<Vec3>& points, double cell_
       for (int i = 0; i < 2; ++i) {
         out.materials.push_back(material_of(p.type));
         out.tints.push_back(tint_of(p.id));
+        out.ids.push_back(static_cast<std::uint16_t>(p.id));
       }
     }
 }

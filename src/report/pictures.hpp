@@ -30,7 +30,7 @@ std::string scan_pictures(const Observation& seen, int size_px);
 std::string cloud_pictures(const Surfels& surfels, const Primitives& primitives, int size_px);
 
 /// The two pictures that need no scan: CAD, and the model made from it.
-std::string part_pictures(const Part& part, int size_px);
+std::string part_pictures(const Part& part, int part_class, int size_px);
 
 /// The legend under the pictures.
 std::string picture_legend();

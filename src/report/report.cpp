@@ -3,6 +3,7 @@
 #include <fstream>
 
 #include "report/html.hpp"
+#include "report/links.hpp"
 #include "report/pictures.hpp"
 #include "report/sections.hpp"
 #include "tribin/core/error.hpp"
@@ -67,15 +68,19 @@ const Instance* best_of(const Found& found, const std::string& part) {
 void write_locate_report(const std::filesystem::path& dir, const Scan& scan, std::span<const Part> parts,
                          const Found& found, const ReportContext& context, const std::optional<ReportTruth>& truth) {
   const report::Observation seen{scan, found.surfels, found.primitives};
-  std::string pictures = report::section(
-      "pictures", "Ten pictures a part",
-      "The same ten as figures 4 and 5 of the paper, from this scan; each part where it was found best.");
+  std::string pictures =
+      report::section("pictures", "Ten pictures a part",
+                      "The same ten as figures 4 and 5 of the paper, from this scan; each part where it was found "
+                      "best. Point at a surface in one picture and it lights up in the "
+                      "others; click holds it.");
   for (std::size_t i = 0; i < parts.size() && i < kPicturedParts; ++i) {
     const Instance* instance = best_of(found, parts[i].name);
-    pictures +=
-        "<h3>" + report::class_tag(static_cast<int>(i)) + report::escaped(parts[i].name) +
-        (instance ? "" : " <span class=\"muted\">not found: its CAD alone</span>") + "</h3><div class=\"pics\">" +
-        report::ten_pictures(seen, parts[i], instance, static_cast<int>(i), picture_size(parts.size())) + "</div>";
+    pictures += "<div data-part=\"" + report::escaped(parts[i].name) + "\"><h3>" +
+                report::class_tag(static_cast<int>(i)) + report::escaped(parts[i].name) +
+                (instance ? "" : " <span class=\"muted\">not found: its CAD alone</span>") +
+                "</h3><div class=\"pics\">" +
+                report::ten_pictures(seen, parts[i], instance, static_cast<int>(i), picture_size(parts.size())) +
+                "</div></div>";
   }
   pictures += report::picture_legend() + "</section>\n";
 
@@ -120,7 +125,7 @@ void write_segment_report(const std::filesystem::path& dir, const Surfels& surfe
             : report::cloud_pictures(surfels, primitives, 480)) +
       "</div>" + report::picture_legend() + "</section>\n" +
       report::primitives_section(primitives.items, scan ? surfels.scan->input_from_camera : Pose::Identity(),
-                                 "In the input's frame.");
+                                 "In the input's frame.", report::scan_key);
   if (context.times) {
     contents.push_back({"time", "Time"});
     body += report::time_section(times, context.threads);
@@ -148,9 +153,10 @@ void write_part_report(const std::filesystem::path& dir, const Part& part, const
             (part.self_similar.size() == 1 ? " leaves" : "s leave") +
             " most of its surface in place: these are the ones to mistake it for.";
   const std::string body = report::warning_lines({}, part.warnings) + report::section("pictures", "Pictures", "") +
-                           "<div class=\"two\">" + report::part_pictures(part, 720) + "</div>" +
+                           "<div class=\"two\">" + report::part_pictures(part, 0, 720) + "</div>" +
                            report::picture_legend() + "</section>\n" +
-                           report::primitives_section(part.model.primitives, Pose::Identity(), "In the CAD's frame.") +
+                           report::primitives_section(part.model.primitives, Pose::Identity(), "In the CAD's frame.",
+                                                      [](int id) { return report::cad_key(0, id); }) +
                            report::again_section(context);
   write_page(dir,
              report::page("tribin: " + part.name, part.name, lead, part.warnings.empty() ? "ok" : "warn", "compiled",

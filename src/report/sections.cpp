@@ -5,6 +5,7 @@
 
 #include "report/html.hpp"
 #include "report/json_values.hpp"
+#include "report/links.hpp"
 #include "tribin/report/summary.hpp"
 
 namespace tribin::report {
@@ -127,9 +128,10 @@ struct Beyond {
   bool radius = false;
 };
 
-std::string evidence_row(const Evidence& e, Beyond& beyond) {
-  std::string out =
-      "<tr><td>" + type_icon(e.type) + " " + escaped(e.primitive) + (e.radius_nominal_mm ? ", r" : ", place") + "</td>";
+std::string evidence_row(const Evidence& e, int part_class, Beyond& beyond) {
+  const std::string key = e.scan_primitive > 0 ? scan_key(e.scan_primitive) : cad_key(part_class, e.cad_primitive);
+  std::string out = "<tr" + link_to({key}) + "><td>" + type_icon(e.type) + " " + escaped(e.primitive) +
+                    (e.radius_nominal_mm ? ", r" : ", place") + "</td>";
   std::optional<double> nominal = e.radius_nominal_mm, measured = e.radius_measured_mm, sigma = e.radius_sigma_mm;
   if (!nominal && e.offset_mm) nominal = 0, measured = e.offset_mm, sigma = e.offset_sigma_mm;
   if (nominal && measured && sigma && *sigma > 0) {
@@ -170,8 +172,9 @@ std::string evidence_section(std::span<const Part> parts, const Found& found) {
   Beyond beyond;
   for (std::size_t i = 0; i < found.instances.items.size() && i < kMost; ++i) {
     const Instance& instance = found.instances.items[i];
-    tables += "<div><h3>" + class_tag(std::max(0, class_of(parts, instance.part))) + escaped(instance.part) + " " +
-              std::to_string(instance.id) + "</h3>";
+    const int part_class = std::max(0, class_of(parts, instance.part));
+    tables +=
+        "<div><h3>" + class_tag(part_class) + escaped(instance.part) + " " + std::to_string(instance.id) + "</h3>";
     const std::vector<std::string> columns = {
         "Primitive" + unit("mm"), "Nominal", "Measured", "σ", "Difference", "Arc", "rms"};
     tables += head(columns, 1);
@@ -180,7 +183,7 @@ std::string evidence_section(std::span<const Part> parts, const Found& found) {
       if (k == kOpen && instance.evidence.size() > kOpen + 2)
         tables += std::string(kTail) + "<details><summary>" + std::to_string(instance.evidence.size() - kOpen) +
                   " smaller ones</summary>" + head(columns, 1);
-      tables += evidence_row(instance.evidence[k], beyond);
+      tables += evidence_row(instance.evidence[k], part_class, beyond);
     }
     tables += std::string(kTail) + (instance.evidence.size() > kOpen + 2 ? "</details>" : "") + "</div>";
   }
@@ -323,8 +326,8 @@ std::string again_section(const ReportContext& context) {
   return out + ". The same input gives the same answer, whatever the number of threads.</p></section>\n";
 }
 
-std::string primitives_section(const std::vector<Primitive>& primitives, const Pose& b_from_a,
-                               const std::string& lead) {
+std::string primitives_section(const std::vector<Primitive>& primitives, const Pose& b_from_a, const std::string& lead,
+                               std::string (*key_of)(int id)) {
   std::string out = section("primitives", "Primitives", lead) +
                     head({"Id", "Type", "Area" + unit("mm²"), "Radius" + unit("mm"), "Height" + unit("mm"),
                           "Arc" + unit("deg"), "Axis or normal", "rms" + unit("mm"), "Points"},
@@ -334,10 +337,11 @@ std::string primitives_section(const std::vector<Primitive>& primitives, const P
     const bool round =
         p.type == PrimitiveType::cylinder || p.type == PrimitiveType::sphere || p.type == PrimitiveType::torus;
     const bool high = p.type == PrimitiveType::cylinder || p.type == PrimitiveType::cone;
-    out += "<tr><td>" + std::to_string(p.id) + "</td><td>" + type_icon(p.type) + " " + name_of(p.type) +
-           (p.concave ? " <span class=\"muted\">concave</span>" : "") + (p.name.empty() ? "" : " " + escaped(p.name)) +
-           "</td>" + cell(number(p.area_mm2, 1)) + cell(round ? number(p.radius_mm, 3) : "–") +
-           cell(high ? number(p.height_mm(), 2) : "–") + cell(high ? number(p.arc / kDegree, 0) : "–") +
+    out += "<tr" + link_to({key_of(p.id)}) + "><td>" + std::to_string(p.id) + "</td><td>" + type_icon(p.type) + " " +
+           name_of(p.type) + (p.concave ? " <span class=\"muted\">concave</span>" : "") +
+           (p.name.empty() ? "" : " " + escaped(p.name)) + "</td>" + cell(number(p.area_mm2, 1)) +
+           cell(round ? number(p.radius_mm, 3) : "–") + cell(high ? number(p.height_mm(), 2) : "–") +
+           cell(high ? number(p.arc / kDegree, 0) : "–") +
            cell(p.type == PrimitiveType::sphere
                     ? "–"
                     : number(axis.x(), 4) + "  " + number(axis.y(), 4) + "  " + number(axis.z(), 4)) +

@@ -16,7 +16,9 @@ std::string why_not_section(std::span<const Part> parts, const Found& found);
 /// Milliseconds a stage beside the paper's table I, on a logarithmic scale.
 std::string time_section(const StageTimes& times, int threads);
 std::string again_section(const ReportContext& context);
-std::string primitives_section(const std::vector<Primitive>& primitives, const Pose& b_from_a, const std::string& lead);
+/// \param key_of  id -> the key that links a row with the pictures (links.hpp).
+std::string primitives_section(const std::vector<Primitive>& primitives, const Pose& b_from_a, const std::string& lead,
+                               std::string (*key_of)(int id));
 std::string warning_lines(const std::vector<Warning>& warnings, const std::vector<std::string>& more);
 
 /// 0 = A, ...: the place of the part in the list; -1 if it is not there.

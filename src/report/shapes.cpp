@@ -97,6 +97,7 @@ void colour_by_primitives(ShadedSurface& surface, const Part& part, const Pose& 
   const double reach = 0.003 * part.diameter_mm, turn = std::cos(20 * kDegree);
   const Pose part_from_b = b_from_part.inverse();
   surface.tints.assign(surface.triangles.size(), 0);
+  surface.ids.assign(surface.triangles.size(), 0);
   for (std::size_t t = 0; t < surface.triangles.size(); ++t) {
     Vec3 corner[3];
     for (int i = 0; i < 3; ++i) corner[i] = part_from_b * surface.vertices[surface.triangles[t][i]].cast<double>();
@@ -116,6 +117,7 @@ void colour_by_primitives(ShadedSurface& surface, const Part& part, const Pose& 
       best = worst;
       surface.materials[t] = material_of(p.type);
       surface.tints[t] = tint_of(p.id);
+      surface.ids[t] = static_cast<std::uint16_t>(p.id);
     }
   }
 }

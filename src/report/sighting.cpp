@@ -148,6 +148,7 @@ ShadedSurface surface_of(const Scan& scan, const Surfels& surfels, const Sightin
     out.materials.push_back(looks[a].material);
     out.steps.push_back(looks[a].step);
     out.tints.push_back(looks[a].tint);
+    out.ids.push_back(looks[a].id);
   };
   for (int j = 0; j + 1 < grid.height; ++j)
     for (int i = 0; i + 1 < grid.width; ++i) {

@@ -24,6 +24,7 @@ struct PixelLook {
   Material material = Material::grey;
   std::uint8_t step = 0;
   float tint = 0;
+  std::uint16_t id = 0;  ///< of the primitive shown, 0 = none
 };
 
 /// The scan inside a rectangle as triangles, every `stride` pixels; holes stay holes, depth edges are not bridged.

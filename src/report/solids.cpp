@@ -25,7 +25,7 @@ struct Labels {
 
 PixelLook look_of_type(const Primitive* p) {
   if (!p) return {Material::none};
-  return {material_of(p->type), 0, tint_of(p->id)};
+  return {material_of(p->type), 0, tint_of(p->id), static_cast<std::uint16_t>(p->id)};
 }
 
 bool on_part(const Sighting& where, int u, int v) { return where.on_part.empty() || where.on_part(u, v) != 0; }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "report/links.hpp"
 #include "report/spaces.hpp"
 
 namespace tribin::report {
@@ -12,11 +13,14 @@ std::vector<PeakMark> marks(const Primitives& primitives, const Sighting& where,
   std::vector<PeakMark> out;
   for (int k : where.primitives) {
     const Primitive& p = primitives.items[k];
-    if (p.type != type || out.size() >= most) continue;
+    if (p.type != type) continue;
     const auto same = std::find_if(out.begin(), out.end(), [&](const PeakMark& m) {
       return std::abs(m.direction.dot(p.axis)) > std::cos(10 * kDegree);  // one ring for those that would overlap
     });
-    if (same == out.end()) out.push_back({p.axis, (type == PrimitiveType::plane ? "P" : "C") + std::to_string(p.id)});
+    if (same != out.end())
+      same->keys.push_back(scan_key(p.id));
+    else if (out.size() < most)
+      out.push_back({p.axis, (type == PrimitiveType::plane ? "P" : "C") + std::to_string(p.id), {scan_key(p.id)}});
   }
   return out;
 }
@@ -28,13 +32,18 @@ std::vector<CircleMark> circles(const Primitives& primitives, const Sighting& wh
     if (p.type != PrimitiveType::cylinder && p.type != PrimitiveType::cone) continue;
     const bool cone = p.type == PrimitiveType::cone;
     const auto alike = [&](const CircleMark& m) { return m.type == name_of(p.type); };
-    if (static_cast<std::size_t>(std::count_if(out.begin(), out.end(), alike)) >= most) continue;
-    const CircleMark mark{p.axis, cone ? (p.concave ? 1 : -1) * std::sin(p.half_angle) : 0, "C" + std::to_string(p.id),
-                          name_of(p.type)};
+    const CircleMark mark{p.axis,
+                          cone ? (p.concave ? 1 : -1) * std::sin(p.half_angle) : 0,
+                          "C" + std::to_string(p.id),
+                          name_of(p.type),
+                          {scan_key(p.id)}};
     const auto same = std::find_if(out.begin(), out.end(), [&](const CircleMark& m) {
       return std::abs(m.axis.dot(mark.axis)) > std::cos(3 * kDegree) && std::abs(m.d - mark.d) < 0.05;
     });
-    if (same == out.end()) out.push_back(mark);
+    if (same != out.end())
+      same->keys.push_back(scan_key(p.id));
+    else if (static_cast<std::size_t>(std::count_if(out.begin(), out.end(), alike)) < most)
+      out.push_back(mark);
   }
   return out;
 }

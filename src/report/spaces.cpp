@@ -5,6 +5,7 @@
 #include <cstdio>
 
 #include "report/html.hpp"
+#include "report/links.hpp"
 
 namespace tribin::report {
 namespace {
@@ -69,11 +70,12 @@ struct Dots {
   }
 };
 
-std::string ring(const Spot& s, const std::string& css, const std::string& label) {
-  std::string out = "<circle class=\"ring " + css + "\" r=\"7\" " + text("cx=\"%.1f\" cy=\"%.1f\"/>", s.x, s.y);
+std::string ring(const Spot& s, const std::string& css, const PeakMark& peak) {
+  std::string out = "<circle class=\"ring " + css + "\"" + link_to(peak.keys) + " r=\"7\" " +
+                    text("cx=\"%.1f\" cy=\"%.1f\"/>", s.x, s.y);
   const bool left = s.x > 165;
   out += "<text class=\"mark\" " + text("x=\"%.1f\" y=\"%.1f\"", s.x + (left ? -9 : 9), s.y + 4) +
-         (left ? " text-anchor=\"end\">" : ">") + escaped(label) + "</text>";
+         (left ? " text-anchor=\"end\">" : ">") + escaped(peak.label) + "</text>";
   return out;
 }
 
@@ -139,11 +141,12 @@ std::string sphere_svg(const std::vector<float>& bins, const std::vector<PeakMar
       if (n.z() > 0.01) s.z = -1;
       return s;
     });
-    out += "<path class=\"circle-halo\" d=\"" + d + "\"/><path class=\"circle " + c.type + "\" d=\"" + d + "\"/>";
+    out += "<path class=\"circle-halo\" d=\"" + d + "\"/><path class=\"circle " + c.type + "\"" + link_to(c.keys) +
+           " d=\"" + d + "\"/>";
   }
   for (const PeakMark& peak : peaks) {
     const Spot s = on_sphere(upward(peak.direction));
-    if (s.z >= 0) out += ring(s, "plane", peak.label);
+    if (s.z >= 0) out += ring(s, "plane", peak);
   }
   const char* const names[] = {"i", "j", "k"};
   for (int axis = 0; axis < 3; ++axis) {
@@ -184,9 +187,10 @@ std::string disc_svg(const std::vector<float>& bins, const std::vector<PeakMark>
     const Vec3 axis = upward(peak.direction.normalized());
     if (axis.z() < 0.25) {  // an axis and its opposite are one: near the rim the twin lies across
       const Spot twin = on_disc({-axis.x(), -axis.y(), 0});
-      out += "<circle class=\"ring cylinder twin\" r=\"7\" " + text("cx=\"%.1f\" cy=\"%.1f\"/>", twin.x, twin.y);
+      out += "<circle class=\"ring cylinder twin\"" + link_to(peak.keys) + " r=\"7\" " +
+             text("cx=\"%.1f\" cy=\"%.1f\"/>", twin.x, twin.y);
     }
-    out += ring(on_disc(axis), "cylinder", peak.label);
+    out += ring(on_disc(axis), "cylinder", peak);
   }
   return out + "</svg>";
 }

@@ -13,13 +13,15 @@ inline constexpr int kVoteColours = 12;  ///< CSS classes m0 .. m11 of the page'
 struct PeakMark {
   Vec3 direction = Vec3::UnitZ();
   std::string label;
+  std::vector<std::string> keys;  ///< of the primitives that it stands for (links.hpp)
 };
 /// A circle that normals draw on the sphere: all n with dot(axis, n) = d.
 struct CircleMark {
   Vec3 axis = Vec3::UnitZ();
   double d = 0;
   std::string label;
-  std::string type;  ///< CSS class: cylinder, cone
+  std::string type;               ///< CSS class: cylinder, cone
+  std::vector<std::string> keys;  ///< as of a peak
 };
 
 /// Area of the surfels' normals (as axes: z >= 0) in the bins of a golden spiral.
