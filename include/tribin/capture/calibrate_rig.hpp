@@ -40,7 +40,8 @@ struct ObserverCalibration {
   double sigma_px = 0;                        ///< sd of one coordinate
   int points = 0;                             ///< in use
   int dropped_points = 0;                     ///< beyond 5 sigma in used views
-  std::array<double, 9> ray_sd_px{};  ///< sd of a pixel's ray in the middle of each ninth, by a rotation that fits where the boards were
+  std::array<double, 9>
+      ray_sd_px{};  ///< sd of a pixel's ray in the middle of each ninth, by a rotation that fits where the boards were
   BoardCoverage coverage;
 };
 
