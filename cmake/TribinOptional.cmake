@@ -20,6 +20,27 @@ else()
   message(STATUS "tribin: STEP and IGES: off (install libocct-data-exchange-dev)")
 endif()
 
+# tribin::calibration: boards in pictures by OpenCV.
+find_package(OpenCV QUIET COMPONENTS core imgproc imgcodecs features2d calib3d OPTIONAL_COMPONENTS aruco)
+if(OpenCV_FOUND)
+  tribin_stage_sources(TRIBIN_CALIBRATION_SOURCES calibration)
+  add_library(tribin_calibration ${TRIBIN_CALIBRATION_SOURCES})
+  add_library(tribin::calibration ALIAS tribin_calibration)
+  set_target_properties(tribin_calibration PROPERTIES EXPORT_NAME calibration)
+  target_link_libraries(tribin_calibration PUBLIC tribin PRIVATE opencv_core opencv_imgproc opencv_imgcodecs
+                                                                 opencv_features2d opencv_calib3d)
+  target_include_directories(tribin_calibration PRIVATE ${PROJECT_SOURCE_DIR}/src)
+  target_include_directories(tribin_calibration SYSTEM PRIVATE ${OpenCV_INCLUDE_DIRS})
+  if(TARGET opencv_aruco)
+    target_link_libraries(tribin_calibration PRIVATE opencv_aruco)
+    target_compile_definitions(tribin_calibration PRIVATE TRIBIN_HAS_ARUCO)
+  endif()
+  target_compile_definitions(tribin_calibration INTERFACE TRIBIN_WITH_CALIBRATION)
+  message(STATUS "tribin: calibration from pictures: OpenCV ${OpenCV_VERSION}")
+else()
+  message(STATUS "tribin: calibration from pictures: off (install libopencv-dev)")
+endif()
+
 # tribin::sim: the simulated camera by Embree, convex hulls by Bullet.
 find_package(embree 3 CONFIG QUIET)
 find_package(Bullet CONFIG QUIET)

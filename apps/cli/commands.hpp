@@ -31,6 +31,8 @@ void add_patterns(CLI::App& app, Context& context);
 void add_scan(CLI::App& app, Context& context);
 void add_simulate(CLI::App& app, Context& context);
 void add_calibrate(CLI::App& app, Context& context);
+void add_calibrate_camera(CLI::App& group, Context& context);
+void add_calibrate_rig(CLI::App& group, Context& context);
 void add_calibrate_hand_eye(CLI::App& group, Context& context);
 void add_calibrate_touch(CLI::App& group, Context& context);
 void add_bench(CLI::App& app, Context& context);

@@ -166,7 +166,7 @@ void set_priors(Device& device, const BoardObserver& observer) {
   device.prior_mean << 0, 0, 0.5 * (observer.width - 1), 0.5 * (observer.height - 1), 0, 0, 0, 0, 0;
   const double principal = observer.projector ? observer.height : 0.1 * diagonal;
   device.prior_sd << 0, 0, principal, principal, 0.3 / square, 0.1 / (square * square), 0.01 / corner, 0.01 / corner,
-      0.03 / (square * square * square);
+      0.01 / (square * square * square);
 }
 
 Bundle calibrate_alone(const Board& board, const BoardObserver& observer, std::size_t views) {

@@ -72,7 +72,7 @@ inline constexpr double kOutlierView = 3;
 /// out and may come back, until nothing changes. Boards that look alike after a turn are turned to agree.
 /// Priors keep what the pictures do not hold from being slid by noise: principal point at the picture's middle (sd a
 /// tenth of the diagonal; projectors: the height), and the displacement by k1, k2, p1, p2, k3 at the picture's corner
-/// (sd 30, 10, 1, 1, 3 % of the corner's distance from the middle).
+/// (sd 30, 10, 1, 1, 1 % of the corner's distance from the middle).
 /// \param ids    of the views, for messages. \throws Error too_little_data for fewer views than kFewestViews, observers
 ///               that share no view, or boards that all face a camera so that its focal length stays open.
 /// \cost         a tenth of a second for 2 cameras and 15 views.
