@@ -27,8 +27,8 @@ Image<std::uint8_t> to_8_bit(const Image<std::uint16_t>& picture);
 ///         levels' centroid; ChArUco: detectMarkers, corners from the markers' homography, then cornerSubPix.
 std::optional<BoardSighting> find_board(const Image<std::uint8_t>& picture, const Board& board);
 
-/// Inner corners of a chessboard of any size (3 x 3 at least), the larger number first: says what a picture shows where the
-/// wanted board was not found.
+/// Inner corners of a chessboard of any size (3 x 3 at least), the larger number first: says what a picture shows where
+/// the wanted board was not found.
 std::optional<std::pair<int, int>> chessboard_size(const Image<std::uint8_t>& picture);
 
 }  // namespace tribin
