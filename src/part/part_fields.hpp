@@ -85,16 +85,16 @@ void each_field(Archive& to, T& similar) {
 
 template <class Archive, Is<PartView> T>
 void each_field(Archive& to, T& view) {
-  auto& [direction, points, normals, area, extents] = view;
-  to(direction, points, normals, area, extents);
+  auto& [direction, points, normals, area] = view;
+  to(direction, points, normals, area);
 }
 
 template <class Archive, Is<Part> T>
 void each_field(Archive& to, T& part) {
   auto& [name, mesh, render_mesh, model, exposed, primitive_of_triangle, box_min, box_max, diameter, area, gyration,
-         symmetry, self_similar, nearly_round, views, warnings] = part;
+         symmetry, self_similar, nearly_round, views, sample_points, sample_normals, warnings] = part;
   to(name, mesh, render_mesh, model, exposed, primitive_of_triangle, box_min, box_max, diameter, area, gyration,
-     symmetry, self_similar, nearly_round, views, warnings);
+     symmetry, self_similar, nearly_round, views, sample_points, sample_normals, warnings);
 }
 
 // The last value of each enum that is stored: a byte above it is no such enum.

@@ -159,8 +159,9 @@ bool is_sound(const Part& part) {
   }
   const auto is_id = [&](int id) { return id >= 1 && static_cast<std::size_t>(id) <= primitives; };
   for (const Relation& r : part.model.relations) sound = sound && is_id(r.first) && is_id(r.second);
-  for (const PartView& v : part.views)
-    sound = sound && v.normals.size() == v.points.size() && v.extents.size() == (v.points.empty() ? 0 : kViewAngles);
+  for (const PartView& v : part.views) sound = sound && v.normals.size() == v.points.size();
+  // A pair of samples keeps its first one in 16 bits.
+  sound = sound && part.sample_normals.size() == part.sample_points.size() && part.sample_points.size() <= 65535;
   return sound;
 }
 

@@ -107,6 +107,22 @@ LookUp look_up_early(const SceneDepth& scene, const Pose& camera_from_part, std:
   return out;
 }
 
+double point_cost(const SceneDepth& scene, const Pose& camera_from_part, std::span<const Vec3f> points,
+                  double slack_mm) {
+  const FastPose fast(camera_from_part);
+  double cost = 0;
+  int count = 0;
+  for (const Vec3f& point : points) {
+    const Vec3f q = fast.move(point);
+    const Pixel p = project(scene, q);
+    if (!p.inside || scene.near_break(p.u, p.v)) continue;
+    const double e = scene.z_mm(p.u, p.v) - q[2], sigma = scene.sigma_mm(p.u, p.v);
+    cost += std::min(8.0, 0.5 * e * e / (sigma * sigma + slack_mm * slack_mm));
+    ++count;
+  }
+  return count > 0 ? cost / count : 8.0;
+}
+
 Pose settle_depth(const SceneDepth& scene, const Pose& camera_from_part, std::span<const Vec3f> points,
                   std::size_t count) {
   const FastPose fast(camera_from_part);

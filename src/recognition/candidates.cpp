@@ -208,10 +208,7 @@ std::vector<PoseCandidate> find_candidates(const SceneFeatures& features, SceneD
     hypotheses_from_planes(features, part, poses);
     return sift(scene, part, part_index, poses, poses.size(), 160, rejected);
   }
-  if (source == Source::regions)
-    hypotheses_from_regions(features, part, poses);
-  else
-    hypotheses_from_sweep(features, part, poses);
+  hypotheses_from_point_pairs(features, part, poses);
   // Without a primitive's word for it the right pose stands further down the list.
   return sift(scene, part, part_index, poses, 0, 600, rejected);
 }

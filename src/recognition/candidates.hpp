@@ -14,6 +14,7 @@ struct PoseCandidate {
   int part = 0;  ///< index into the parts
   Pose camera_from_part = Pose::Identity();
   Verification verification;
+  Matrix6 information = Matrix6::Zero();  ///< of its last refinement, as of Refinement
 };
 
 /// Centre of the part's box, camera frame [mm].
@@ -41,7 +42,7 @@ inline double weak_limit_mm(const Part& part) { return 0.01 * part.diameter_mm; 
 Refinement refine_guarded(const Part& part, const SceneDepth& scene, const Pose& start, const RefineOptions& options);
 
 /// Where hypotheses come from, cheapest and surest first.
-enum class Source { primitives, regions, sweep };
+enum class Source { primitives, point_pairs };
 
 /// The candidates of one part in what is not explained yet, best evidence first.
 /// \param scene  its `background` is set for this part.

@@ -32,7 +32,14 @@ CellMask mask_of(const Part& part, const SceneDepth& scene, const PoseCandidate&
 std::vector<double> log_likelihoods(const SceneDepth& scene, std::span<const std::pair<const Part*, Pose>> poses,
                                     int step_px);
 
-Polished polish(const SceneDepth& scene, std::span<const Part> parts, const PoseCandidate& candidate);
+/// A candidate refined and verified on some thousand pixels, as it stands: no other pose is tried.
+PoseCandidate settled_on_scan(const SceneDepth& scene, const Part& part, const PoseCandidate& candidate);
+
+/// Worth a polish? The limits of `acceptable`, as far as a pose that a self-similar one outdoes may miss them.
+bool plausible(const Part& part, const PoseCandidate& settled, std::vector<Reason>& rejected);
+
+/// \param settled  from settled_on_scan.
+Polished polish(const SceneDepth& scene, std::span<const Part> parts, const PoseCandidate& settled);
 
 /// Limits that an answer must keep. Value and limit go into `rejected` when one fails.
 bool acceptable(const Part& part, const PoseCandidate& candidate, std::vector<Reason>& rejected);

@@ -55,16 +55,14 @@ void hypotheses_from_planes(const SceneFeatures& scene, const Part& part, std::v
 /// Two planes, two cylinders, or a plane and a cylinder whose angle, distance and radii agree: leaves at most a slide
 /// or a spin.
 void hypotheses_from_pairs(const SceneFeatures& scene, const Part& part, std::vector<Pose>& out);
-/// A region that no background explains, of the part's size: every view in every spin, centred on it.
-/// \source the paper's "distance based classifier in 2-D image space" (III-B), on what the other spaces leave.
-void hypotheses_from_regions(const SceneFeatures& scene, const Part& part, std::vector<Pose>& out);
+/// Pairs of oriented points of what nothing explains vote for where the part's own pairs lie alike: for parts and views
+/// without handy primitives.
+/// \source B. Drost, M. Ulrich, N. Navab, S. Ilic, "Model globally, match locally", CVPR 2010, on surfels.
+void hypotheses_from_point_pairs(const SceneFeatures& scene, const Part& part, std::vector<Pose>& out);
 
-/// Is a region left that could be a piece of the part?
-bool anything_left(const SceneFeatures& scene, const Part& part);
-
-/// The same where regions are larger than the part (heaps, touching parts, noise): every view in every spin at places
-/// spread over all that no background explains. Tens of thousands of poses; the last resort.
-void hypotheses_from_sweep(const SceneFeatures& scene, const Part& part, std::vector<Pose>& out);
+/// The surfels of connected pieces of the scan that neither the background nor an accepted instance explains and that
+/// are large enough to be a piece of the part. Empty = nothing is left that could be one.
+std::vector<std::uint32_t> unexplained_surfels(const SceneFeatures& scene, const Part& part);
 
 /// Rotation that turns frame (x, y) of the part onto that of the camera: camera_from_part with R x_part = x_camera and
 /// the y of both in one half plane.

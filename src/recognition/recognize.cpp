@@ -121,9 +121,24 @@ void name_neighbours(std::span<const Part> parts, Instances& found) {
   }
 }
 
+/// Poses that were looked at closely and refused: later rounds need not look again, since what is refused by its own
+/// surface and outline is so whatever else the scan holds.
+struct Refused {
+  std::vector<PoseCandidate> candidates;
+
+  bool holds(std::span<const Part> parts, const PoseCandidate& c) const {
+    const Part& part = parts[static_cast<std::size_t>(c.part)];
+    return std::any_of(candidates.begin(), candidates.end(), [&](const PoseCandidate& r) {
+      return r.part == c.part &&
+             close_poses(part, r.camera_from_part, c.camera_from_part, 0.015 * part.diameter_mm, 3 * kDegree);
+    });
+  }
+};
+
 /// Best first: each place of the scan goes to the pose, of any part, that explains it best.
 std::vector<Polished> choose(const SceneDepth& scene, std::span<const Part> parts,
-                             std::vector<PoseCandidate> candidates, std::vector<Reason>& rejected) {
+                             std::vector<PoseCandidate> candidates, Refused& refused, std::vector<Reason>& rejected) {
+  std::erase_if(candidates, [&](const PoseCandidate& c) { return refused.holds(parts, c); });
   std::stable_sort(candidates.begin(), candidates.end(), [](const PoseCandidate& a, const PoseCandidate& b) {
     return a.verification.gain > b.verification.gain;
   });
@@ -155,8 +170,25 @@ std::vector<Polished> choose(const SceneDepth& scene, std::span<const Part> part
       ++n;
       rivals.push_back(k);
     }
+    for (const std::size_t k : rivals) done[k] = true;
+    std::vector<PoseCandidate> settled(rivals.size());
+    parallel_each(static_cast<int>(rivals.size()), [&](int r) {
+      const PoseCandidate& c = candidates[rivals[static_cast<std::size_t>(r)]];
+      settled[static_cast<std::size_t>(r)] = settled_on_scan(scene, parts[static_cast<std::size_t>(c.part)], c);
+    });
     std::vector<Polished> polished;
-    for (const std::size_t k : rivals) polished.push_back(polish(scene, parts, candidates[k]));
+    for (std::size_t r = 0; r < rivals.size(); ++r) {
+      const PoseCandidate& c = settled[r];
+      const bool twin =
+          std::any_of(polished.begin(), polished.end(), [&](const Polished& p) { return p.candidate.part == c.part; });
+      if (plausible(parts[static_cast<std::size_t>(c.part)], c, rejected)) {
+        // Of one part, the polish itself tries the poses that are mistaken for each other.
+        if (!twin) polished.push_back(polish(scene, parts, c));
+      } else {
+        refused.candidates.push_back(candidates[rivals[r]]);
+      }
+    }
+    if (polished.empty()) continue;
     std::size_t best = 0;
     std::vector<double> likelihood(polished.size(), 0.0);
     if (polished.size() > 1) {
@@ -166,10 +198,12 @@ std::vector<Polished> choose(const SceneDepth& scene, std::span<const Part> part
       likelihood = log_likelihoods(scene, poses, step_for(*poses[0].first, scene, poses[0].second, 6000));
       best = static_cast<std::size_t>(std::max_element(likelihood.begin(), likelihood.end()) - likelihood.begin());
     }
-    for (const std::size_t k : rivals) done[k] = true;
     Polished& winner = polished[best];
     const Part& part = parts[static_cast<std::size_t>(winner.candidate.part)];
-    if (!acceptable(part, winner.candidate, rejected)) continue;
+    if (!acceptable(part, winner.candidate, rejected)) {
+      for (const std::size_t k : rivals) refused.candidates.push_back(candidates[k]);
+      continue;
+    }
     for (std::size_t k = 0; k < polished.size(); ++k) {
       if (k == best) continue;
       const Part& other = parts[static_cast<std::size_t>(polished[k].candidate.part)];
@@ -196,8 +230,9 @@ Instances recognize(const Primitives& primitives, const PrimitiveModel& observat
     return options.time_limit_ms > 0 &&
            std::chrono::steady_clock::now() - start > std::chrono::milliseconds(options.time_limit_ms);
   };
-  // Rounds on what is left: primitives first, as long as they lead to parts; then regions; then the sweep.
-  for (const Source source : {Source::primitives, Source::regions, Source::sweep}) {
+  Refused refused;
+  // Rounds on what is left: primitives first, as long as they lead to parts; then pairs of points.
+  for (const Source source : {Source::primitives, Source::point_pairs}) {
     constexpr int kRounds = 8;  // each round takes at least one part of those that touch or hide each other
     for (int round = 0; round < kRounds; ++round) {
       if ((out.time_limit = late())) break;
@@ -207,7 +242,7 @@ Instances recognize(const Primitives& primitives, const PrimitiveModel& observat
             find_candidates(features, scene, parts[i], static_cast<int>(i), source, out.rejected);
         candidates.insert(candidates.end(), found.begin(), found.end());
       }
-      const std::vector<Polished> winners = choose(scene, parts, std::move(candidates), out.rejected);
+      const std::vector<Polished> winners = choose(scene, parts, std::move(candidates), refused, out.rejected);
       for (const Polished& w : winners) {
         Instance instance = make_instance(w, parts, scene, features, surfels.scan->noise, options);
         claim_cells(features, w.mask.bits);
@@ -227,7 +262,8 @@ Instances recognize(const Primitives& primitives, const PrimitiveModel& observat
                    [](const Instance& a, const Instance& b) { return a.score > b.score; });
   for (std::size_t i = 0; i < out.items.size(); ++i) out.items[i].id = static_cast<int>(i) + 1;
   name_neighbours(parts, out);
-  out.unexplained = std::any_of(parts.begin(), parts.end(), [&](const Part& p) { return anything_left(features, p); });
+  out.unexplained =
+      std::any_of(parts.begin(), parts.end(), [&](const Part& p) { return !unexplained_surfels(features, p).empty(); });
   return out;
 }
 

@@ -34,12 +34,7 @@ struct PartView {
   std::vector<Vec3f> points;       ///< visible surface points, part frame; any prefix covers the view evenly
   std::vector<Vec3f> normals;      ///< their facets' normals
   double area_mm2 = 0;             ///< projected
-  /// Where the seen points begin and end (1 % and 99 % quantiles) along kViewAngles directions across the view:
-  /// direction k lies k * 360 / kViewAngles degrees from u of orthonormal_basis(direction), towards v.
-  std::vector<Vec2> extents;
 };
-
-inline constexpr int kViewAngles = 24;
 
 /// A CAD file made ready for finding it in scans.
 struct Part {
@@ -59,6 +54,8 @@ struct Part {
   std::vector<ContinuousSymmetry>
       nearly_round;  ///< axes about which turns leave most of the part in place: spins are searched
   std::vector<PartView> views;
+  std::vector<Vec3f> sample_points;   ///< of all that can be seen, 5 % of the diameter apart
+  std::vector<Vec3f> sample_normals;  ///< their facets' normals, outward
   std::vector<std::string> warnings;
 
   Vec3 box_center() const { return 0.5 * (box_min + box_max); }

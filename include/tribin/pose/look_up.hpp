@@ -37,6 +37,12 @@ LookUp look_up_early(const SceneDepth& scene, const Pose& camera_from_part, std:
                      std::span<const Vec3f> normals, std::size_t first, std::size_t count, double tolerance_mm,
                      double hopeless);
 
+/// Mean cost of the points at a pose that is settled: half the squared residual along the line of sight, in the local
+/// sigma and `slack_mm` together, bounded at 4 sigma in front as behind; unmeasured points and those beside depth
+/// breaks are left out. Only differences between poses of one part mean something.
+double point_cost(const SceneDepth& scene, const Pose& camera_from_part, std::span<const Vec3f> points,
+                  double slack_mm);
+
 /// Moves a pose along its line of sight so that the median point lies on the scan: for poses whose depth is a guess.
 Pose settle_depth(const SceneDepth& scene, const Pose& camera_from_part, std::span<const Vec3f> points,
                   std::size_t count);
