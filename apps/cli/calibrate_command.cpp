@@ -7,6 +7,7 @@ void add_calibrate(CLI::App& app, Context& context) {
                                 "tribin calibrate hand-eye poses.json --mount fixed --json hand_eye.json");
   group->require_subcommand(1);
   add_calibrate_camera(*group, context);
+  add_calibrate_projector(*group, context);
   add_calibrate_rig(*group, context);
   add_calibrate_hand_eye(*group, context);
   add_calibrate_touch(*group, context);

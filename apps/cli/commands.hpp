@@ -32,6 +32,7 @@ void add_scan(CLI::App& app, Context& context);
 void add_simulate(CLI::App& app, Context& context);
 void add_calibrate(CLI::App& app, Context& context);
 void add_calibrate_camera(CLI::App& group, Context& context);
+void add_calibrate_projector(CLI::App& group, Context& context);
 void add_calibrate_rig(CLI::App& group, Context& context);
 void add_calibrate_hand_eye(CLI::App& group, Context& context);
 void add_calibrate_touch(CLI::App& group, Context& context);

@@ -22,7 +22,8 @@ Eigen::Matrix3d normaliser(const Points& points) {
 
 }  // namespace
 
-std::optional<Eigen::Matrix3d> homography_of(std::span<const Vec3> board, std::span<const Vec2> pixel) {
+std::optional<Eigen::Matrix3d> homography_of(std::span<const Vec3> board, std::span<const Vec2> pixel,
+                                             std::span<const double> weights) {
   if (board.size() < 4) return std::nullopt;
   const Eigen::Matrix3d from = normaliser(board), to = normaliser(pixel);
   Eigen::Matrix<double, 9, 9> square = Eigen::Matrix<double, 9, 9>::Zero();
@@ -34,7 +35,7 @@ std::optional<Eigen::Matrix3d> homography_of(std::span<const Vec3> board, std::s
     rows.block<1, 3>(0, 6) = -b.x() * a.transpose();
     rows.block<1, 3>(1, 3) = a.transpose();
     rows.block<1, 3>(1, 6) = -b.y() * a.transpose();
-    square += rows.transpose() * rows;
+    square += (weights.empty() ? 1.0 : weights[i]) * rows.transpose() * rows;
   }
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 9, 9>> solver(square);
   // Points on a line leave more than one solution.

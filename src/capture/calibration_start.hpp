@@ -11,8 +11,9 @@
 namespace tribin::calibration_detail {
 
 /// The homography that maps board points (x, y in mm; z is not looked at) to pixels; none for fewer than 4 points or
-/// points on a line. \source direct linear transform with Hartley's normalisation.
-std::optional<Eigen::Matrix3d> homography_of(std::span<const Vec3> board, std::span<const Vec2> pixel);
+/// points on a line. \param weights  empty: all equal. \source direct linear transform with Hartley's normalisation.
+std::optional<Eigen::Matrix3d> homography_of(std::span<const Vec3> board, std::span<const Vec2> pixel,
+                                             std::span<const double> weights = {});
 
 /// The focal length [px] at which the board's axes come out square and equally long in all views, the principal point
 /// being known; none where no view is tilted enough to say. \source Zhang 2000, with one unknown.

@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "io/atomic_file.hpp"
-#include "io/file_bytes.hpp"
+#include "io/json_fields.hpp"
 #include "io/png.hpp"
 #include "tribin/core/parallel.hpp"
 
@@ -13,7 +13,7 @@ namespace tribin {
 namespace {
 
 using io::bad_file;
-using nlohmann::json;
+using io::JsonPlace;
 
 /// One entry of "patterns"; a Gray entry without period_px is completed later.
 struct Entry {
@@ -21,52 +21,43 @@ struct Entry {
   Pattern pattern;
 };
 
-std::string text_at(const std::string& file, const std::string& place, const json& object, const char* key) {
-  if (!object.contains(key) || !object.at(key).is_string())
-    bad_file(file, place + key, object.contains(key) ? io::in_quotes(object.at(key).dump()) : "nothing", "a text");
-  return object.at(key).get<std::string>();
-}
-
-double number_at(const std::string& file, const std::string& place, const json& object, const char* key, double least) {
-  const json& value = object.at(key);
-  if (!value.is_number() || !std::isfinite(value.get<double>()) || value.get<double>() < least)
-    bad_file(file, place + key, io::in_quotes(value.dump()),
-             least > -1e300 ? "a number >= " + std::to_string(least) : "a number");
-  return value.get<double>();
-}
-
-Entry entry_of(const std::string& file, const std::string& place, const json& object) {
-  constexpr double kAny = -1e308;
-  if (!object.is_object()) bad_file(file, place, io::in_quotes(object.dump()), "an object");
+Entry entry_of(const JsonPlace& object) {
+  constexpr double kLarge = 1e9;
+  object.must_be_object("{\"file\", \"kind\", ..}");
   Entry out;
-  out.file = text_at(file, place, object, "file");
-  const std::string kind = text_at(file, place, object, "kind");
+  Pattern& p = out.pattern;
+  out.file = object.at("file", "the image's name").text("the image's name");
+  constexpr const char* kKinds = "phase, gray, gray_inverse, white or black";
+  const std::string kind = object.at("kind", kKinds).text(kKinds);
   bool known = false;
   for (const PatternKind k :
        {PatternKind::phase, PatternKind::gray, PatternKind::gray_inverse, PatternKind::white, PatternKind::black})
-    if (kind == name_of(k)) out.pattern.kind = k, known = true;
-  if (!known) bad_file(file, place + "kind", io::in_quotes(kind), "phase, gray, gray_inverse, white or black");
-  if (object.contains("exposure_ms")) out.pattern.exposure_ms = number_at(file, place, object, "exposure_ms", 0);
-  if (out.pattern.kind == PatternKind::white || out.pattern.kind == PatternKind::black) return out;
-  if (object.contains("axis")) {
-    const std::string axis = text_at(file, place, object, "axis");
-    if (axis != "column" && axis != "row") bad_file(file, place + "axis", io::in_quotes(axis), "column or row");
-    out.pattern.axis = axis == "row" ? PatternAxis::row : PatternAxis::column;
+    if (kind == name_of(k)) p.kind = k, known = true;
+  if (!known) object.at("kind", "").fail(kKinds);
+  const auto number = [&](const char* key, double least, const char* wanted, double& value) {
+    if (object.has(key)) value = object.at(key, wanted).number(least, kLarge, wanted);
+  };
+  number("exposure_ms", 0, "a time >= 0", p.exposure_ms);
+  if (p.kind == PatternKind::white || p.kind == PatternKind::black) return out;
+  if (object.has("axis")) {
+    const std::string axis = object.at("axis", "").text("column or row");
+    if (axis != "column" && axis != "row") object.at("axis", "").fail("column or row");
+    p.axis = axis == "row" ? PatternAxis::row : PatternAxis::column;
   }
-  if (object.contains("bit")) out.pattern.bit = static_cast<int>(number_at(file, place, object, "bit", 0));
-  if (object.contains("period_px")) out.pattern.period_px = number_at(file, place, object, "period_px", 1e-3);
-  if (out.pattern.kind == PatternKind::phase) {
-    if (out.pattern.period_px == 0) bad_file(file, place + "period_px", "nothing", "the fringe period");
-    if (!object.contains("shift_deg")) bad_file(file, place + "shift_deg", "nothing", "the shift of a phase image");
-    out.pattern.shift_rad = number_at(file, place, object, "shift_deg", kAny) * kDegree;
-  } else if (out.pattern.period_px == 0 && out.pattern.bit < 0) {
-    bad_file(file, place + "period_px", "neither period_px nor bit", "the width of the words of a Gray image");
+  if (object.has("bit")) p.bit = object.at("bit", "").whole(0, 30, "the number of a bit, 0 = coarsest");
+  number("period_px", 1e-3, "a length > 0", p.period_px);
+  if (p.kind == PatternKind::phase) {
+    if (p.period_px == 0) object.at("period_px", "the fringe period");
+    constexpr const char* kShift = "the shift of a phase image";
+    p.shift_rad = object.at("shift_deg", kShift).number(-kLarge, kLarge, kShift) * kDegree;
+  } else if (p.period_px == 0 && p.bit < 0) {
+    object.at("period_px", "the width of the words of a Gray image, or its bit");
   }
   return out;
 }
 
 /// Gray images that are only numbered: the finest one's words are a fringe wide.
-void complete_periods(const std::string& file, const std::string& place, std::vector<Entry>& entries) {
+void complete_periods(const JsonPlace& place, std::vector<Entry>& entries) {
   for (Entry& e : entries) {
     Pattern& p = e.pattern;
     if (p.period_px > 0 || p.kind == PatternKind::white || p.kind == PatternKind::black) continue;
@@ -78,7 +69,7 @@ void complete_periods(const std::string& file, const std::string& place, std::ve
       if (other.pattern.kind == PatternKind::phase)
         fringe = fringe == 0 ? other.pattern.period_px : std::min(fringe, other.pattern.period_px);
     }
-    if (fringe == 0) bad_file(file, place, "numbered Gray images without phase images", "phase images of their axis");
+    if (fringe == 0) place.fail("phase images of their axis beside Gray images that are only numbered");
     p.period_px = std::ldexp(fringe, finest - p.bit);
   }
 }
@@ -110,26 +101,26 @@ FrameStack read_stack(const std::filesystem::path& folder, const std::string& ca
 
 std::vector<FrameStack> read_frames(const std::filesystem::path& folder, const std::filesystem::path& frames_file) {
   const io::FileBytes file = io::read_file(frames_file.empty() ? folder / "frames.json" : frames_file);
-  json top;
-  try {
-    top = json::parse(file.data);
-  } catch (const json::parse_error& error) {
-    bad_file(file.name, io::at_line(file.view(), error.byte), "text that is no JSON", "frames.json");
+  const nlohmann::json document = io::parse_json(file, "frames.json");
+  const JsonPlace top(file.name, document, JsonPlace::kTop);
+  int width = 0, height = 0;
+  if (top.has("projector") && !top.at("projector", "").value().is_null()) {
+    constexpr const char* kSize = "{\"width\", \"height\"} in pixels, 1..65535";
+    width = top.at("projector", kSize).at("width", kSize).whole(1, 65535, kSize);
+    height = top.at("projector", kSize).at("height", kSize).whole(1, 65535, kSize);
   }
-  if (!top.is_object() || !top.contains("cameras") || !top.at("cameras").is_array() || top.at("cameras").empty())
-    bad_file(file.name, "cameras", "nothing", "a list of one camera or more");
+  constexpr const char* kCameras = "a list of one camera or more";
+  const JsonPlace cameras = top.at("cameras", kCameras);
+  if (cameras.array_size(kCameras) == 0) cameras.fail(kCameras);
   std::vector<FrameStack> out;
-  for (std::size_t c = 0; c < top.at("cameras").size(); ++c) {
-    const json& object = top.at("cameras")[c];
-    const std::string place = "cameras[" + std::to_string(c) + "].";
-    if (!object.is_object() || !object.contains("patterns") || !object.at("patterns").is_array() ||
-        object.at("patterns").empty())
-      bad_file(file.name, place + "patterns", "nothing", "a list of patterns");
+  for (std::size_t c = 0; c < cameras.array_size(kCameras); ++c) {
+    const JsonPlace camera = cameras.at(c), patterns = camera.at("patterns", "a list of patterns");
+    if (patterns.array_size("a list of patterns") == 0) patterns.fail("a list of patterns");
     std::vector<Entry> entries;
-    for (std::size_t i = 0; i < object.at("patterns").size(); ++i)
-      entries.push_back(entry_of(file.name, place + "patterns[" + std::to_string(i) + "].", object.at("patterns")[i]));
-    complete_periods(file.name, place + "patterns", entries);
-    out.push_back(read_stack(folder, text_at(file.name, place, object, "camera"), entries));
+    for (std::size_t i = 0; i < patterns.value().size(); ++i) entries.push_back(entry_of(patterns.at(i)));
+    complete_periods(patterns, entries);
+    out.push_back(read_stack(folder, camera.at("camera", "its name").text("its name"), entries));
+    out.back().projector_width = width, out.back().projector_height = height;
   }
   return out;
 }

@@ -21,6 +21,7 @@ class JsonPlace {
       : file_(file), value_(value), place_(std::move(place)) {}
 
   const Json& value() const { return value_; }
+  const std::string& place() const { return place_; }
   [[noreturn]] void fail(std::string_view wanted, ErrorCode code = ErrorCode::bad_input) const {
     bad_file(file_, place_, value_.is_object() ? "an object" : in_quotes(value_.dump()), wanted, code);
   }
@@ -60,13 +61,27 @@ class JsonPlace {
   }
 
   std::vector<double> numbers(std::size_t count, std::string_view wanted) const {
-    if (!value_.is_array() || value_.size() != count) fail(wanted);
+    return numbers(count, count, wanted);
+  }
+  std::vector<double> numbers(std::size_t least, std::size_t most, std::string_view wanted) const {
+    if (!value_.is_array() || value_.size() < least || value_.size() > most) fail(wanted);
     std::vector<double> out;
     for (const Json& number : value_) {
       if (!number.is_number() || !std::isfinite(number.get<double>())) fail(wanted);
       out.push_back(number.get<double>());
     }
     return out;
+  }
+
+  /// A number in [least, most].
+  double number(double least, double most, std::string_view wanted) const {
+    if (!value_.is_number() || !(value_.get<double>() >= least && value_.get<double>() <= most)) fail(wanted);
+    return value_.get<double>();
+  }
+
+  int whole(int least, int most, std::string_view wanted) const {
+    if (!value_.is_number_integer()) fail(wanted);
+    return static_cast<int>(number(least, most, wanted));
   }
 
   std::string text(std::string_view wanted) const {

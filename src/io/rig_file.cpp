@@ -2,16 +2,16 @@
 
 #include <Eigen/LU>
 #include <cmath>
-#include <nlohmann/json.hpp>
 
 #include "io/atomic_file.hpp"
+#include "io/json_fields.hpp"
 #include "io/opencv_yaml.hpp"
 
 namespace tribin {
 namespace {
 
 using io::bad_file;
-using nlohmann::json;
+using io::JsonPlace;
 using Matrices = std::map<std::string, io::YamlMatrix>;
 
 void check_rotation(const std::string& file, const std::string& place, const Matrix3& r) {
@@ -31,62 +31,32 @@ void check_intrinsics(const std::string& file, const std::string& place, const s
   camera.cy = k[5];
 }
 
-/// `count` numbers below a key.
-std::vector<double> list(const std::string& file, const std::string& place, const json& object, const char* key,
-                         std::size_t least, std::size_t most) {
-  const std::string wanted =
-      least == most ? std::to_string(most) + " numbers" : "up to " + std::to_string(most) + " numbers";
-  if (!object.contains(key)) bad_file(file, place + key, "nothing", wanted);
-  const json& value = object.at(key);
-  if (!value.is_array() || value.size() < least || value.size() > most)
-    bad_file(file, place + key, io::in_quotes(value.dump()), wanted);
-  std::vector<double> out;
-  for (const json& v : value) {
-    if (!v.is_number()) bad_file(file, place + key, io::in_quotes(v.dump()), wanted);
-    out.push_back(v.get<double>());
-  }
-  return out;
-}
-
-int pixels(const std::string& file, const std::string& place, const json& object, const char* key) {
-  if (!object.contains(key) || !object.at(key).is_number_integer() || object.at(key).get<long long>() < 1 ||
-      object.at(key).get<long long>() > 65535)
-    bad_file(file, place + key, object.contains(key) ? io::in_quotes(object.at(key).dump()) : "nothing",
-             "a whole number of pixels in 1..65535");
-  return object.at(key).get<int>();
-}
-
-RigCamera camera_of(const std::string& file, const std::string& place, const json& object) {
-  if (!object.is_object()) bad_file(file, place, io::in_quotes(object.dump()), "an object");
+RigCamera camera_of(const std::string& file, const JsonPlace& object) {
+  object.must_be_object("an object with width, height, K");
   RigCamera out;
-  if (object.contains("name")) {
-    if (!object.at("name").is_string())
-      bad_file(file, place + "name", io::in_quotes(object.at("name").dump()), "a text");
-    out.name = object.at("name").get<std::string>();
-  }
-  out.camera.width = pixels(file, place, object, "width");
-  out.camera.height = pixels(file, place, object, "height");
-  const std::vector<double> k = list(file, place, object, "K", 9, 9);
+  if (object.has("name")) out.name = object.at("name", "").text("a text");
+  constexpr const char* kPixels = "a whole number of pixels in 1..65535";
+  out.camera.width = object.at("width", kPixels).whole(1, 65535, kPixels);
+  out.camera.height = object.at("height", kPixels).whole(1, 65535, kPixels);
+  const JsonPlace k = object.at("K", "9 numbers, row-wise");
+  const std::vector<double> list = k.numbers(9, "9 numbers, row-wise");
   std::array<double, 9> matrix{};
-  std::copy(k.begin(), k.end(), matrix.begin());
-  check_intrinsics(file, place + "K", matrix, out.camera);
-  if (object.contains("distortion")) {
-    const std::vector<double> d = list(file, place, object, "distortion", 0, 5);
+  std::copy(list.begin(), list.end(), matrix.begin());
+  check_intrinsics(file, k.place(), matrix, out.camera);
+  if (object.has("distortion")) {
+    const std::vector<double> d = object.at("distortion", "").numbers(0, 5, "up to 5 numbers: k1, k2, p1, p2, k3");
     std::copy(d.begin(), d.end(), out.distortion.begin());
   }
-  if (!object.contains("rig_from_camera")) return out;
-  const json& pose = object.at("rig_from_camera");
-  const std::string at = place + "rig_from_camera.";
-  if (!pose.is_object() || !pose.contains("rotation") || !pose.at("rotation").is_array() ||
-      pose.at("rotation").size() != 3)
-    bad_file(file, at + "rotation", io::in_quotes(pose.dump()), "3 rows of 3 numbers");
-  const json& rows = pose.at("rotation");
-  for (int r = 0; r < 3; ++r) {
-    const std::vector<double> row = list(file, at, json{{"rotation", rows[r]}}, "rotation", 3, 3);
-    for (int c = 0; c < 3; ++c) out.rig_from_camera.linear()(r, c) = row[static_cast<std::size_t>(c)];
+  if (!object.has("rig_from_camera")) return out;
+  const JsonPlace pose = object.at("rig_from_camera", ""), rows = pose.at("rotation", "3 rows of 3 numbers");
+  if (rows.array_size("3 rows of 3 numbers") != 3) rows.fail("3 rows of 3 numbers");
+  for (std::size_t r = 0; r < 3; ++r) {
+    const std::vector<double> row = rows.at(r).numbers(3, "3 numbers");
+    for (std::size_t c = 0; c < 3; ++c)
+      out.rig_from_camera.linear()(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(c)) = row[c];
   }
-  check_rotation(file, at + "rotation", out.rig_from_camera.linear());
-  const std::vector<double> t = list(file, at, pose, "translation_mm", 3, 3);
+  check_rotation(file, rows.place(), out.rig_from_camera.linear());
+  const std::vector<double> t = pose.at("translation_mm", "3 numbers").numbers(3, "3 numbers");
   out.rig_from_camera.translation() = Vec3(t[0], t[1], t[2]);
   return out;
 }
@@ -136,36 +106,28 @@ Rig opencv_rig(const Matrices& all, const std::string& files, double unit_mm) {
   return rig;
 }
 
-Rig opencv_by_json(const io::FileBytes& file, const json& top, const std::filesystem::path& beside,
-                   const std::filesystem::path& folder) {
-  const json& names = top.at("opencv");
-  if (!names.is_array() || names.empty())
-    bad_file(file.name, "opencv", io::in_quotes(names.dump()), "a list of file names");
+Rig opencv_by_json(const JsonPlace& top, const std::filesystem::path& beside, const std::filesystem::path& folder) {
+  const JsonPlace names = top.at("opencv", "");
+  constexpr const char* kFiles = "a list of file names";
+  if (names.array_size(kFiles) == 0) names.fail(kFiles);
   Matrices all;
   std::string files;
-  for (const json& name : names) {
-    if (!name.is_string()) bad_file(file.name, "opencv", io::in_quotes(name.dump()), "a file name");
-    std::filesystem::path place = beside / name.get<std::string>();
-    if (!std::filesystem::exists(place) && !folder.empty()) place = folder / name.get<std::string>();
+  for (std::size_t i = 0; i < names.value().size(); ++i) {
+    const std::string name = names.at(i).text("a file name");
+    std::filesystem::path place = beside / name;
+    if (!std::filesystem::exists(place) && !folder.empty()) place = folder / name;
     const io::FileBytes yaml = io::read_file(place);
     all.merge(io::parse_opencv_yaml(yaml));
     files += (files.empty() ? "" : ", ") + yaml.name;
   }
   double unit = 1;
-  if (top.contains("unit_mm")) {
-    if (!top.at("unit_mm").is_number() || !(top.at("unit_mm").get<double>() > 0))
-      bad_file(file.name, "unit_mm", io::in_quotes(top.at("unit_mm").dump()), "a length > 0");
-    unit = top.at("unit_mm").get<double>();
-  }
+  // A unit between a micrometre and a kilometre.
+  if (top.has("unit_mm")) unit = top.at("unit_mm", "").number(1e-3, 1e6, "a length > 0");
   Rig rig = opencv_rig(all, files, unit);
-  if (top.contains("names")) {
-    if (!top.at("names").is_array() || top.at("names").size() != rig.cameras.size())
-      bad_file(file.name, "names", io::in_quotes(top.at("names").dump()), "one for each camera");
-    for (std::size_t i = 0; i < rig.cameras.size(); ++i) {
-      if (!top.at("names")[i].is_string()) bad_file(file.name, "names", io::in_quotes(top.at("names").dump()), "texts");
-      rig.cameras[i].name = top.at("names")[i].get<std::string>();
-    }
-  }
+  if (!top.has("names")) return rig;
+  const JsonPlace cameras = top.at("names", "");
+  if (cameras.array_size("one for each camera") != rig.cameras.size()) cameras.fail("one for each camera");
+  for (std::size_t i = 0; i < rig.cameras.size(); ++i) rig.cameras[i].name = cameras.at(i).text("a name");
   return rig;
 }
 
@@ -190,23 +152,18 @@ nlohmann::ordered_json json_of(const RigCamera& c) {
 Rig read_rig(const std::filesystem::path& path, const std::filesystem::path& folder) {
   const io::FileBytes file = io::read_file(path);
   if (file.view().substr(0, 5) == "%YAML") return opencv_rig(io::parse_opencv_yaml(file), file.name, 1);
-  json top;
-  try {
-    top = json::parse(file.data);
-  } catch (const json::parse_error& error) {
-    bad_file(file.name, io::at_line(file.view(), error.byte), "text that is no JSON", "rig.json or OpenCV's YAML");
-  }
-  if (!top.is_object()) bad_file(file.name, "top level", io::in_quotes(top.dump()), "a JSON object");
-  if (top.contains("opencv")) return opencv_by_json(file, top, path.parent_path(), folder);
-  if (!top.contains("cameras") || !top.at("cameras").is_array() || top.at("cameras").empty())
-    bad_file(file.name, "cameras", top.contains("cameras") ? io::in_quotes(top.at("cameras").dump()) : "nothing",
-             "a list of one camera or more");
+  const nlohmann::json document = io::parse_json(file, "rig.json or OpenCV's YAML");
+  const JsonPlace top(file.name, document, JsonPlace::kTop);
+  top.must_be_object("a JSON object");
+  if (top.has("opencv")) return opencv_by_json(top, path.parent_path(), folder);
+  constexpr const char* kCameras = "a list of one camera or more";
+  const JsonPlace cameras = top.at("cameras", kCameras);
+  if (cameras.array_size(kCameras) == 0) cameras.fail(kCameras);
   Rig rig;
   rig.source = file.name;
-  for (std::size_t i = 0; i < top.at("cameras").size(); ++i)
-    rig.cameras.push_back(camera_of(file.name, "cameras[" + std::to_string(i) + "].", top.at("cameras")[i]));
-  if (top.contains("projector") && !top.at("projector").is_null())
-    rig.projector = camera_of(file.name, "projector.", top.at("projector"));
+  for (std::size_t i = 0; i < cameras.value().size(); ++i) rig.cameras.push_back(camera_of(file.name, cameras.at(i)));
+  if (top.has("projector") && !top.at("projector", "").value().is_null())
+    rig.projector = camera_of(file.name, top.at("projector", ""));
   return rig;
 }
 

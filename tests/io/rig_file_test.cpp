@@ -132,7 +132,7 @@ TEST(FramesFile, SaysWhatIsWrong) {
   };
   refused(frames(R"({"file": "a.png", "kind": "stripes"})"), "cameras[0].patterns[0].kind");
   refused(frames(R"({"file": "a.png", "kind": "phase", "period_px": 16})"), "shift_deg");
-  refused(frames(R"({"file": "a.png", "kind": "gray"})"), "neither period_px nor bit");
+  refused(frames(R"({"file": "a.png", "kind": "gray"})"), "no \"period_px\", wanted the width of the words");
   refused(frames(R"({"file": "a.png", "kind": "white"})"), "a.png");
   refused([&] { read_frames(folder.path() / "none"); }, "frames.json");
 }

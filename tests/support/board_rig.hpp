@@ -38,7 +38,8 @@ inline Pose pose_at(const Vec3& rotation, const Vec3& translation) {
 inline RigCamera random_device(sim::Random& random, const BoardRigOptions& options, bool projector) {
   RigCamera out;
   const double width = options.width, height = options.height;
-  const double focal = options.focal * width * random.uniform(0.9, 1.1);
+  // A projector lights more than a camera sees.
+  const double focal = options.focal * width * random.uniform(0.9, 1.1) * (projector ? 0.8 : 1.0);
   out.camera = {options.width,
                 options.height,
                 focal,
@@ -67,10 +68,12 @@ inline BoardRig random_board_rig(unsigned seed, const BoardRigOptions& options =
     RigCamera& device = out.devices.back();
     device.name = projector ? "projector" : c == 0 ? "left" : c == 1 ? "right" : "camera" + std::to_string(c);
     const double aside = projector ? 0.5 : c;
+    // The middle of its image, not its principal point, looks at the boards.
+    const double up = std::atan2(0.5 * options.height - device.camera.cy, device.camera.fy);
     if (c > 0)
-      device.rig_from_camera = pose_at(
-          Vec3(random.uniform(-0.02, 0.02), -0.3 * aside + random.uniform(-0.03, 0.03), random.uniform(-0.03, 0.03)),
-          Vec3(0.3 * distance * aside, random.uniform(-10, 10), random.uniform(-10, 20)));
+      device.rig_from_camera = pose_at(Vec3(up + random.uniform(-0.02, 0.02),
+                                            -0.3 * aside + random.uniform(-0.03, 0.03), random.uniform(-0.03, 0.03)),
+                                       Vec3(0.3 * distance * aside, random.uniform(-10, 10), random.uniform(-10, 20)));
   }
   const Vec3 middle = 0.5 * (points.front() + points.back());
   for (int v = 0; v < options.views; ++v) {

@@ -18,6 +18,8 @@ struct FrameStack {
   std::vector<Image<std::uint8_t>> grey8;
   std::vector<Image<std::uint16_t>> grey16;
   std::vector<std::string> files;  ///< names for messages; may be empty
+  int projector_width = 0;         ///< of the patterns [px], 0 = not said
+  int projector_height = 0;
 
   int width() const { return !grey8.empty() ? grey8[0].width : grey16.empty() ? 0 : grey16[0].width; }
   int height() const { return !grey8.empty() ? grey8[0].height : grey16.empty() ? 0 : grey16[0].height; }

@@ -10,7 +10,8 @@ namespace tribin {
 /// Reads the frames of a structured-light scan: the images that frames.json names, 8- or 16-bit grey PNG.
 ///
 /// frames.json: {"cameras": [{"camera": name, "patterns": [{"file", "kind": "phase|gray|gray_inverse|white|black",
-/// "axis": "column|row", "period_px", "shift_deg", "bit", "exposure_ms"}]}]}. A phase image is brightest where
+/// "axis": "column|row", "period_px", "shift_deg", "bit", "exposure_ms"}]}], "projector": {"width", "height"}}, the
+/// last of which only calibration needs. A phase image is brightest where
 /// 360 X / period_px + shift_deg = 0, X counted from the edge of projector pixel 0. A Gray image is bright where
 /// floor(X / period_px) mod 4 is 1 or 2: period_px is the width of the words that the bits down to this one make. Gray
 /// images may leave period_px out and give `bit` (0 = coarsest): then the finest bit's words are as wide as a fringe.
