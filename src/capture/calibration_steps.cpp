@@ -66,10 +66,11 @@ void need_views(const Bundle& bundle, std::span<const BoardObserver> observers) 
       used += bundle.view_used[static_cast<std::size_t>(s.view)] != 0;
     }
     if (used >= kFewestViews) continue;
-    throw Error(ErrorCode::too_little_data,
-                quoted(observers[d].name) + ": saw " + std::to_string(used) +
-                    (used == seen ? used == 1 ? " view of the board" : " views of the board" : " of " + std::to_string(seen) + " views that agree") +
-                    ", wanted " + std::to_string(kFewestViews) + " at least; 10 to 20 are good");
+    throw Error(ErrorCode::too_little_data, quoted(observers[d].name) + ": saw " + std::to_string(used) +
+                                                (used == seen ? used == 1 ? " view of the board" : " views of the board"
+                                                              : " of " + std::to_string(seen) + " views that agree") +
+                                                ", wanted " + std::to_string(kFewestViews) +
+                                                " at least; 10 to 20 are good");
   }
 }
 
