@@ -37,9 +37,9 @@ bool same_surface(const CadFace& a, const CadFace& b) {
   return false;
 }
 
-bool is_primitive(SurfaceType type) {
-  return type == SurfaceType::plane || type == SurfaceType::cylinder || type == SurfaceType::cone ||
-         type == SurfaceType::sphere;
+bool is_primitive(const CadFace& face) {
+  if (face.type == SurfaceType::torus) return face.minor_radius_mm < face.radius_mm;  // one that meets itself is none
+  return face.type != SurfaceType::free_form;
 }
 
 Surface surface_of(const CadFace& face, const Surfels& s, const Indices& support) {
@@ -78,6 +78,10 @@ Surface surface_of(const CadFace& face, const Surfels& s, const Indices& support
     }
     case SurfaceType::sphere:
       out.type = PrimitiveType::sphere;
+      break;
+    case SurfaceType::torus:
+      out.type = PrimitiveType::torus;
+      out.minor_radius = face.minor_radius_mm;
       break;
     default:
       out.type = PrimitiveType::cylinder;
@@ -119,7 +123,7 @@ void take_cad_faces(Scene& scene, std::vector<FoundSurface>& found) {
     }
   }
   for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
-    if (triangles[f].empty() || !is_primitive(mesh.faces[f].type)) continue;
+    if (triangles[f].empty() || !is_primitive(mesh.faces[f])) continue;
     FoundSurface next;
     next.fit.surface = surface_of(mesh.faces[f], s, triangles[f]);
     next.fit.valid = true;

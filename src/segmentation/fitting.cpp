@@ -250,13 +250,17 @@ Surface cone_from_normals(const Surfels& surfels, std::span<const std::uint32_t>
 }
 
 Surface torus_from_curvature(const Surfels& surfels, std::span<const std::uint32_t> support) {
-  Surface s;
-  s.type = PrimitiveType::torus;
   std::vector<double> curvatures;
   for (std::uint32_t i : support) curvatures.push_back(surfels.curvature1[i]);
   const double curvature = median_of(curvatures);
-  if (curvature == 0) return s;
-  const double tube = 1.0 / curvature;
+  Surface s;
+  s.type = PrimitiveType::torus;
+  return curvature == 0 ? s : torus_of_tube(surfels, support, 1.0 / curvature);
+}
+
+Surface torus_of_tube(const Surfels& surfels, std::span<const std::uint32_t> support, double tube) {
+  Surface s;
+  s.type = PrimitiveType::torus;
   // The circle that the tube runs along: its plane, then its middle and radius by algebraic distances.
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
   Eigen::Matrix3d second = Eigen::Matrix3d::Zero();

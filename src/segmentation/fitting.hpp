@@ -83,6 +83,8 @@ double correlation_inflation(const Surfels& surfels);
 
 /// A torus from its surfels' tighter curvature: one tube radius along the normals lie the points of a circle.
 Surface torus_from_curvature(const Surfels& surfels, std::span<const std::uint32_t> support);
+/// The same where the tube's radius is known [mm], < 0 seen from inside.
+Surface torus_of_tube(const Surfels& surfels, std::span<const std::uint32_t> support, double tube);
 
 /// Robust size of residuals in sigmas: 1.4826 MAD about 0, at least 1, at most what one raw point scatters.
 double residual_scale(const Surfels& surfels, std::span<const std::uint32_t> support, const Surface& surface);

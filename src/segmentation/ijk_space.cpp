@@ -67,7 +67,7 @@ std::optional<FoundSurface> explain_plane(Scene& scene, const Indices& whole, Pl
   if (scene.surfels.mesh == nullptr && std::sqrt(fit.covariance.topLeftCorner<2, 2>().trace()) > 3.0 * kDegree)
     return std::nullopt;
   if (area_of(scene.surfels, out.support) < limits.min_area_mm2) return std::nullopt;
-  if (voters == PlaneVoters::flat_and_undecided &&
+  if (scene.surfels.mesh == nullptr && voters == PlaneVoters::flat_and_undecided &&
       curvature_bound(scene.surfels, out.support, fit) > 0.7 / scene.surfels.max_radius_mm)
     return std::nullopt;
   out.fit = fit;

@@ -102,11 +102,15 @@ bool still_holds(const Scene& scene, const Indices& component, const std::option
 
 }  // namespace
 
+void fill_parameter_space(const Scene& scene, HoughSpaces& spaces) {
+  if (spaces.parameter.empty()) spaces.parameter = vote_rulings(scene, ruled_surfels(scene));
+}
+
 void find_cylinders(Scene& scene, const Limits& limits, HoughSpaces& spaces, std::vector<FoundSurface>& found) {
   const Surfels& s = scene.surfels;
   const DirectionBins& bins = axis_bins();
   std::vector<Ruled> ruled = ruled_surfels(scene);
-  if (spaces.parameter.empty()) spaces.parameter = vote_rulings(scene, ruled);
+  fill_parameter_space(scene, spaces);
   const std::size_t least = std::max<std::size_t>(4, limits.min_surfels / 3);
 
   constexpr int kMaxPeaks = 400;  // each kills its members, so this only guards against a fault

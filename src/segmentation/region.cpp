@@ -74,7 +74,54 @@ std::vector<Indices> components(Scene& scene, std::span<const std::uint32_t> mem
   return out;
 }
 
+namespace {
+
+/// A facet is inscribed in a surface when its corners lie on it and it looks where the surface does between them. What
+/// the surface turns by from corner to corner bounds how far.
+bool inscribed(const Surfels& s, std::uint32_t i, const Surface& surface) {
+  constexpr double kSlack = 3.0 * kDegree;
+  constexpr double kShare = 0.6;  // of the turn between corners: half of it on a ring of facets, more on slanted ones
+  constexpr double kMostTurn = 0.8;  // 46 deg: beyond, a facet is a cap across the surface; circles have 10 and more
+  Vec3 p[3];
+  raw_points(s, i, p);
+  const Vec3 n = s.normal[i].cast<double>();
+  Vec3 normal[3], mean = Vec3::Zero();
+  for (int k = 0; k < 3; ++k) {
+    if (std::abs(surface.distance(p[k])) > 4.0 * s.sigma_mm[i]) return false;
+    normal[k] = surface.normal(p[k]);
+  }
+  for (int k = 0; k < 3; ++k) {
+    const Vec3 q = p[k] - surface.point;
+    // On the axis a cone has no normal: the other two corners say how it lies.
+    if (surface.type == PrimitiveType::cone && (q - surface.axis * surface.axis.dot(q)).norm() < 4.0 * s.sigma_mm[i])
+      normal[k] = (normal[(k + 1) % 3] + normal[(k + 2) % 3]).normalized();
+    mean += normal[k];
+  }
+  double turn = 0, longest = 0, sagitta = 0;
+  for (int k = 0; k < 3; ++k) {
+    const Vec3 &from = p[k], &to = p[(k + 1) % 3];
+    const double edge = (to - from).norm(), turned = (normal[(k + 1) % 3] - normal[k]).norm();
+    // An arc bulges over its chord by an eighth of chord times turn: a plane that touches a torus along a circle has
+    // triangles with all three corners there.
+    const double bulge = std::abs(surface.distance(0.5 * (from + to)));
+    if (bulge > 0.25 * edge * turned + 4.0 * s.sigma_mm[i]) return false;
+    turn = std::max(turn, turned);
+    sagitta = std::max(sagitta, bulge);
+    longest = std::max(longest, edge);
+  }
+  if (turn > kMostTurn) return false;
+  // Over its height a facet tilts by what its longest edge lies below the surface (Schwarz's lantern), and by its
+  // corners' rounding.
+  const double height = std::max(2.0 * s.area_mm2[i] / std::max(longest, 1e-9), 1e-9);
+  const double limit = std::min(kShare * turn + kSlack + (sagitta + 2.0 * s.sigma_mm[i]) / height, kMostTurn);
+  const double agree = mean.normalized().dot(n);
+  return (s.oriented ? agree : std::abs(agree)) > std::cos(limit);
+}
+
+}  // namespace
+
 bool fits(const Surfels& s, std::uint32_t i, const Surface& surface, double scale, double slack) {
+  if (s.mesh != nullptr) return inscribed(s, i, surface);
   const Vec3 p = s.position[i].cast<double>();
   if (std::abs(misfit(s, i, surface)) > 4.0 * scale * s.sigma_mm[i]) return false;
   if (s.point_set != nullptr && s.sigma_normal[i] >= 1) return true;  // no normal: loose points beside edges
@@ -130,23 +177,12 @@ double residual_correlation(Scene& scene, std::span<const std::uint32_t> support
   return squares > 0 ? products / squares : 0;
 }
 
-namespace {
-
-/// On a mesh a cylinder may be tangent to its fillets; a piece of a torus goes on as it is.
-bool bends_alike(const Surfels& s, std::uint32_t i, std::uint32_t j) {
-  const float a = s.curvature1[i], b = s.curvature1[j];
-  return a * b > 0 && std::abs(a) < 1.4f * std::abs(b) && std::abs(b) < 1.4f * std::abs(a) &&
-         std::abs(s.direction2[i].dot(s.direction2[j])) > 0.9f;
-}
-
-}  // namespace
-
 double smooth_rim_share(Scene& scene, std::span<const std::uint32_t> support) {
   const Surfels& s = scene.surfels;
   const std::uint32_t inside = ++scene.tick;
   for (std::uint32_t i : support) scene.mark[i] = inside;
   std::size_t rim = 0, smooth = 0;
-  const int least = s.mesh != nullptr ? 1 : 2;                            // of up to 8 neighbours; a triangle has 3
+  constexpr int kLeast = 2;                                               // of up to 8 neighbours
   const float cos_smooth = static_cast<float>(std::cos(12.0 * kDegree));  // a cell of width w bends by w / R
   for (std::uint32_t i : support) {
     int neighbours = 0, outside_free = 0, outside = 0;
@@ -155,12 +191,11 @@ double smooth_rim_share(Scene& scene, std::span<const std::uint32_t> support) {
       ++neighbours;
       if (scene.mark[j] == inside) continue;
       ++outside;
-      outside_free +=
-          scene.free(j) && (s.mesh != nullptr ? bends_alike(s, i, j) : s.normal[i].dot(s.normal[j]) > cos_smooth);
+      outside_free += scene.free(j) && s.normal[i].dot(s.normal[j]) > cos_smooth;
     }
     if (outside == 0 && (neighbours == 8 || s.scan == nullptr)) continue;
     ++rim;
-    smooth += outside_free >= least;
+    smooth += outside_free >= kLeast;
   }
   return rim > 0 ? static_cast<double>(smooth) / static_cast<double>(rim) : 0;
 }

@@ -17,11 +17,18 @@ FitPoints sample(const Surfels& surfels, std::span<const std::uint32_t> support,
   FitPoints out;
   const std::size_t stride = 1 + support.size() / static_cast<std::size_t>(std::max(1, max_surfels));
   out.reserve(support.size() / stride + 1);
-  Vec3 raw[3];
-  for (std::size_t i = 0; i < support.size(); i += stride) {
-    const int count = raw_points(surfels, support[i], raw);
-    for (int k = 0; k < count; ++k) out.add(raw[k], 1.0 / surfels.sigma_mm[support[i]]);
+  if (surfels.mesh != nullptr) {  // a corner of six triangles is one point
+    std::vector<std::pair<std::uint32_t, float>> corners;
+    for (std::size_t i = 0; i < support.size(); i += stride)
+      for (std::uint32_t v : surfels.mesh->triangles[support[i]]) corners.emplace_back(v, surfels.sigma_mm[support[i]]);
+    std::sort(corners.begin(), corners.end());
+    for (std::size_t k = 0; k < corners.size(); ++k)
+      if (k == 0 || corners[k].first != corners[k - 1].first)
+        out.add(surfels.mesh->vertices[corners[k].first].cast<double>(), 1.0 / corners[k].second);
+    return out;
   }
+  for (std::size_t i = 0; i < support.size(); i += stride)
+    out.add(surfels.position[support[i]].cast<double>(), 1.0 / surfels.sigma_mm[support[i]]);
   return out;
 }
 

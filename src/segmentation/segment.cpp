@@ -6,6 +6,7 @@
 #include "segmentation/cad_faces.hpp"
 #include "segmentation/consensus.hpp"
 #include "segmentation/loose_points.hpp"
+#include "segmentation/mesh_growth.hpp"
 #include "segmentation/spaces.hpp"
 #include "tribin/core/error.hpp"
 #include "tribin/core/parallel.hpp"
@@ -35,6 +36,11 @@ Limits limits_of(const Surfels& surfels, const Scene& scene, const SegmentationO
   limits.min_surfels = cad ? 1 : std::max<std::size_t>(8, static_cast<std::size_t>(0.5 * limits.min_area_mm2 / cell));
   // Surfels call "ruled" what bends by more than half of 1 / max_radius of their options: twice the default of 100 mm.
   limits.max_radius_mm = 250;
+  if (cad) {  // exact corners tell any radius that the part has room for
+    Vec3f low = surfels.position[0], high = low;
+    for (const Vec3f& p : surfels.position) low = low.cwiseMin(p), high = high.cwiseMax(p);
+    limits.max_radius_mm = std::max<double>(limits.max_radius_mm, (high - low).norm());
+  }
   for (double radius : limits.radii_mm) limits.max_radius_mm = std::max(limits.max_radius_mm, 1.5 * radius);
   return limits;
 }
@@ -116,22 +122,26 @@ const char* name_of(PrimitiveType type) {
 
 void segmentation_detail::explain(Scene& scene, const Limits& limits, HoughSpaces& spaces,
                                   std::vector<FoundSurface>& found) {
-  const Surfels& surfels = scene.surfels;
+  if (scene.surfels.mesh != nullptr) {
+    // Corners are exact, so one round is enough: planes that their outline proves, round surfaces, other planes.
+    fill_parameter_space(scene, spaces);
+    if (!scene.surfels.mesh->faces.empty()) return;  // a B-rep says itself what it consists of; the rest is free form
+    find_planes(scene, limits, PlaneVoters::flat, spaces, found);
+    find_round_on_mesh(scene, limits, found);
+    find_planes(scene, limits, PlaneVoters::flat_and_undecided, spaces, found);
+    return;
+  }
   // Back and forth among the spaces on what is left, until a round explains nothing more.
   constexpr int kRounds = 2;
   for (int round = 0; round < kRounds; ++round) {
     const std::size_t before = found.size();
     find_planes(scene, limits, PlaneVoters::flat, spaces, found);
-    // Flat cones of a CAD file would pass as cylinders of large radius; exact vertices let cones go first.
-    if (surfels.mesh != nullptr) find_cones_and_spheres(scene, limits, found);
     find_cylinders(scene, limits, spaces, found);
-    if (surfels.mesh == nullptr) {
-      find_planes(scene, limits, PlaneVoters::flat_and_undecided, spaces, found);
-      find_cones_and_spheres(scene, limits, found);
-    }
+    find_planes(scene, limits, PlaneVoters::flat_and_undecided, spaces, found);
+    find_cones_and_spheres(scene, limits, found);
     if (found.size() == before) break;
   }
-  if (surfels.mesh == nullptr) find_by_great_circles(scene, limits, spaces, found);
+  find_by_great_circles(scene, limits, spaces, found);
 }
 
 Primitives segment(const Surfels& given, const SegmentationOptions& options) {

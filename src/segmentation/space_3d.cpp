@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "segmentation/mesh_pieces.hpp"
 #include "segmentation/spaces.hpp"
 
 namespace tribin::segmentation_detail {
@@ -121,8 +120,7 @@ bool accepted(Scene& scene, const Indices& component, const FoundSurface& c, dou
   sigma *= c.fit.scale / static_cast<double>(c.support.size());
   if (arc < 15 * kDegree || sagitta < 6.0 * sigma) return false;
   // Where two planes meet, the windows of the quadrics round the edge off: a strip of two or three cells along both.
-  if (s.mesh == nullptr && arc * c.fit.surface.radius < 4.0 * scene.cell_mm && flanked_share(scene, c.support) > 0.5)
-    return false;
+  if (arc * c.fit.surface.radius < 4.0 * scene.cell_mm && flanked_share(scene, c.support) > 0.5) return false;
   // A piece cut out of a free-form surface: goes on smoothly past its rim, or leaves waves inside.
   const double rim = smooth_rim_share(scene, c.support);
   const double waves = residual_correlation(scene, c.support, c.fit.surface);
@@ -130,7 +128,7 @@ bool accepted(Scene& scene, const Indices& component, const FoundSurface& c, dou
   const bool closed = arc > kClosedArc;
   if (!closed && (rim > kMaxSmoothRim || (rim > 0.2 && waves > 0.5))) return false;
   // The rougher it lies, the more of it must be seen: curls of hair and lettering pass every other test.
-  if (static_cast<double>(c.support.size()) < kSurfelsPerSigma * c.fit.rms_sigma && s.mesh == nullptr) return false;
+  if (static_cast<double>(c.support.size()) < kSurfelsPerSigma * c.fit.rms_sigma) return false;
   return true;
 }
 
@@ -161,8 +159,6 @@ std::optional<FoundSurface> explain_from(Scene& scene, const Indices& component,
   std::optional<FoundSurface> c = settle(scene, component, start, options, limits);
   if (!c || std::abs(c->fit.surface.half_angle) > 80 * kDegree) return std::nullopt;  // a dented plane
   if (cone && !tapers(c->fit)) return std::nullopt;                                   // find_cylinders' to take
-  if (start.type == PrimitiveType::sphere && scene.surfels.mesh != nullptr && is_ring(scene.surfels, c->support))
-    return std::nullopt;
   c->arc = arc_of(scene.surfels, c->support, c->fit.surface);
   const bool good =
       cone ? accepted(scene, component, *c, c->arc, limits) : accepted_all_round(scene, component, *c, limits);
@@ -273,19 +269,14 @@ void find_cones_and_spheres(Scene& scene, const Limits& limits, std::vector<Foun
   for (SurfelShape shape : {SurfelShape::ruled, SurfelShape::curved}) {
     Indices members;
     for (std::uint32_t i = 0; i < s.size(); ++i)
-      // On a narrow band of facets which of the two a facet is cannot be told from its neighbours.
-      if (scene.free(i) && (s.mesh != nullptr ? s.shape[i] != SurfelShape::flat : s.shape[i] == shape))
-        members.push_back(i);
-    std::vector<Indices> pieces = components(scene, members, least);
-    if (s.mesh != nullptr) add_neighbourhoods(scene, pieces);
-    for (Indices& component : pieces) {
+      if (scene.free(i) && s.shape[i] == shape) members.push_back(i);
+    for (Indices& component : components(scene, members, least)) {
       std::erase_if(component, [&](std::uint32_t i) { return !scene.free(i); });
       if (component.size() < least) continue;
       std::vector<Surface> starts;
       if (shape == SurfelShape::ruled) starts.push_back(cone_from_normals(s, component));
       if (shape == SurfelShape::curved) starts.push_back(sphere_from_normals(s, component));
-      // A CAD file says itself which of its faces are tori; a scan's rulings are those of a bend where it is wide.
-      if (s.mesh == nullptr) starts.push_back(torus_from_curvature(s, component));
+      starts.push_back(torus_from_curvature(s, component));  // rulings are those of a bend where it is wide
       std::optional<FoundSurface> best;
       double best_bic = 1e300;
       for (const Surface& start : starts) {

@@ -36,6 +36,9 @@ enum class PlaneVoters { flat, flat_and_undecided };
 void find_planes(Scene& scene, const Limits& limits, PlaneVoters voters, HoughSpaces& spaces,
                  std::vector<FoundSurface>& found);
 
+/// Parameter space: rulings vote for their axes, for people to look at. Does nothing the second time.
+void fill_parameter_space(const Scene& scene, HoughSpaces& spaces);
+
 /// Parameter space: peaks of rulings; in 3-D space centres and radii become cylinders, and cones where they taper.
 void find_cylinders(Scene& scene, const Limits& limits, HoughSpaces& spaces, std::vector<FoundSurface>& found);
 

@@ -58,13 +58,83 @@ std::vector<Bend> bends_of(const MeshPatches& p) {
   return bends;
 }
 
-/// A patch is a plane when less than 30 % of its rim goes on smoothly, unless it goes on to its like on two sides as
-/// the facets of a narrow band do; or when it is far wider than the strips beside it. \source algorithms.md section 15,
-/// CAD side; the band is ours.
-bool is_plane(const MeshPatches& p, const Bend& bend, std::size_t k) {
-  if (bend.weight == 0) return true;
+/// Whether so many lines bound a patch that it is no facet of anything round: those lie between two rulings and two
+/// chords. \param rim  the patch's rim edges, longest first.
+bool has_many_sides(const Mesh& mesh, const std::vector<const MeshEdge*>& rim, double sigma) {
+  constexpr std::size_t kSides = 5;
+  struct Line {
+    Vec3 point, direction;
+    double length;
+  };
+  std::vector<Line> lines;
+  for (const MeshEdge* e : rim) {
+    const Vec3 ends[] = {mesh.vertices[e->v0].cast<double>(), mesh.vertices[e->v1].cast<double>()};
+    const bool known = std::any_of(lines.begin(), lines.end(), [&](const Line& line) {
+      return std::all_of(std::begin(ends), std::end(ends), [&](const Vec3& p) {
+        const Vec3 q = p - line.point;
+        return q.cross(line.direction).norm() < 4.0 * sigma * (1.0 + q.norm() / line.length);
+      });
+    });
+    const double length = (ends[1] - ends[0]).norm();
+    if (known || !(length > 8.0 * sigma)) continue;
+    if (lines.size() + 1 >= kSides) return true;
+    lines.push_back({ends[0], (ends[1] - ends[0]) / length, length});
+  }
+  return false;
+}
+
+/// Patches that are planes for their outline alone.
+std::vector<std::uint8_t> outlined_planes(const Mesh& mesh, const MeshPatches& p, double sigma) {
+  std::vector<std::vector<const MeshEdge*>> rim(p.patch_area.size());
+  for (const MeshEdge& e : p.edges)
+    if (p.patch[e.a] != p.patch[e.b])
+      for (std::uint32_t t : {e.a, e.b}) rim[p.patch[t]].push_back(&e);
+  std::vector<std::uint8_t> out(rim.size());
+  for (std::size_t k = 0; k < rim.size(); ++k) {
+    std::stable_sort(rim[k].begin(), rim[k].end(),
+                     [](const MeshEdge* a, const MeshEdge* b) { return a->length > b->length; });
+    out[k] = has_many_sides(mesh, rim[k], sigma);
+  }
+  return out;
+}
+
+/// A patch may be a plane when less than 30 % of its rim goes on smoothly, unless it goes on to its like on two sides
+/// as the facets of a narrow band do; or when it is far wider than the strips beside it. \source algorithms.md section
+/// 15, CAD side; the band is ours.
+bool may_be_plane(const MeshPatches& p, const Bend& bend, std::size_t k) {
   if (p.patch_smooth_rim[k] < 0.3 * p.patch_rim[k] && bend.alike < 2) return true;
   return p.patch_width[k] > 2.5 * bend.neighbour_width;
+}
+
+/// Whether all coordinates are multiples of `step`, up to float.
+bool on_grid(const Mesh& mesh, double step) {
+  for (const Vec3f& v : mesh.vertices)
+    for (int k = 0; k < 3; ++k) {
+      const double x = v[k];
+      if (std::abs(x - step * std::round(x / step)) > 2e-7 * std::abs(x)) return false;
+    }
+  return true;
+}
+
+/// How far vertices lie off the surface that they were put on [mm, sd]: the writer's last decimal where one shows, else
+/// what float and CAD kernels leave.
+double rounding_mm(const Mesh& mesh) {
+  Vec3f low = mesh.vertices[mesh.triangles[0][0]], high = low;
+  for (const Vec3f& v : mesh.vertices) {
+    low = low.cwiseMin(v);
+    high = high.cwiseMax(v);
+  }
+  const double diagonal = (high - low).norm();
+  // Six or seven digits; kernels let faces and their edges part by about half a micrometre.
+  const double least = std::max(std::min(5e-4, 1e-5 * diagonal), 3e-6 * diagonal);
+  // A coarser grid than 1e-4 of the part is that of its design: boxes have round coordinates.
+  for (double step = 1; step > least; step /= 10) {
+    if (step > 1e-4 * diagonal) continue;
+    for (double unit : {1.0, 25.4})  // a decimal of a millimetre or of an inch
+      if (unit * step <= 1e-4 * diagonal && on_grid(mesh, unit * step))
+        return std::max(least, unit * step / std::sqrt(12.0));
+  }
+  return least;
 }
 
 }  // namespace
@@ -75,13 +145,9 @@ Surfels surfels_from_mesh(const Mesh& mesh) {
   const MeshPatches p = find_patches(mesh);
   const std::vector<Bend> bends = bends_of(p);
 
-  Vec3f low = mesh.vertices[mesh.triangles[0][0]], high = low;
-  for (const Vec3f& v : mesh.vertices) {
-    low = low.cwiseMin(v);
-    high = high.cwiseMax(v);
-  }
-  // Vertices sit on the surface up to the rounding of the file: six or seven digits, or thousandths of a millimetre.
-  const float rounding = std::max(5e-4f, 3e-6f * (high - low).norm());
+  const float rounding = static_cast<float>(rounding_mm(mesh));
+
+  const std::vector<std::uint8_t> outlined = outlined_planes(mesh, p, rounding);
 
   Surfels s;
   s.mesh = &mesh;
@@ -106,7 +172,12 @@ Surfels surfels_from_mesh(const Mesh& mesh) {
     Vec3 u, v;
     orthonormal_basis(p.normal[t], u, v);
     s.direction2[t] = u.cast<float>();
-    if (is_plane(p, bend, k)) continue;
+    if (bend.weight == 0) continue;
+    if (may_be_plane(p, bend, k)) {
+      if (outlined[k]) continue;
+      s.shape[t] = SurfelShape::unknown;
+      continue;
+    }
     // A surface is ruled where its normal turns one way only: across the ruling. (The edges between facets are the
     // rulings where facets are long, but zigzag on a narrow band of a cone.) Exactly one way gives 1, a ball 1/2.
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver{Eigen::Matrix3d(bend.turns)};
@@ -124,10 +195,6 @@ Surfels surfels_from_mesh(const Mesh& mesh) {
   std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs;
   for (const MeshEdge& e : p.edges) {
     if (std::abs(e.dihedral) >= kSmooth) continue;
-    // Rulings that cross are those of two surfaces that are tangent: a cylinder and its fillet.
-    if (s.shape[e.a] == SurfelShape::ruled && s.shape[e.b] == SurfelShape::ruled &&
-        std::abs(s.direction2[e.a].dot(s.direction2[e.b])) < 0.7f)
-      continue;
     pairs.emplace_back(e.a, e.b);
     pairs.emplace_back(e.b, e.a);
   }

@@ -38,6 +38,9 @@ double total_area(const std::vector<Primitive>& primitives) {
 double apart_mm(const Primitive& a, const Primitive& b) {
   constexpr double kNever = 1e300;
   if (a.type != b.type || (a.type != PrimitiveType::plane && a.concave != b.concave)) return kNever;
+  if (a.type == PrimitiveType::torus)
+    return std::max({(a.point - b.point).norm(), std::abs(a.radius_mm - b.radius_mm),
+                     std::abs(a.minor_radius_mm - b.minor_radius_mm), a.axis.cross(b.axis).norm() * a.radius_mm});
   if (a.type == PrimitiveType::sphere) return std::max((a.point - b.point).norm(), std::abs(a.radius_mm - b.radius_mm));
   if (a.type != PrimitiveType::cylinder && a.axis.dot(b.axis) < 0) return kNever;  // the other side
   const double angle = a.axis.cross(b.axis).norm();
@@ -60,8 +63,7 @@ void expect_contained(const std::vector<Primitive>& a, const std::vector<Primiti
   const double least = 2e-3 * total_area(a);
   for (const Primitive& p : a) {
     if (p.area_mm2 < least) continue;
-    // Not yet: on triangles a cone that is all but flat and ends in fillets (alternator A's rear, 78 deg) is not found.
-    if (p.type == PrimitiveType::cone && p.half_angle > 75 * kDegree) continue;
+    if (p.type == PrimitiveType::torus) continue;  // Not yet all on triangles: see IsTheSameInAnyTessellation
     double nearest = 1e300;
     for (const Primitive& q : b) nearest = std::min(nearest, apart_mm(p, q));
     EXPECT_LE(nearest, limit) << direction << ": " << name_of(p.type) << " " << p.id << ", " << p.area_mm2 << " mm2, r "
@@ -87,7 +89,8 @@ void write_iges(const fs::path& step, const fs::path& iges, int mode) {
 
 std::vector<fs::path> sample_parts() {
   std::vector<fs::path> parts = {kParts / "alternator_a.step", kParts / "alternator_b.step"};
-  for (const char* name : {"cad/o2ac/03-PANEL2.step", "cad/occt/bm2_ec_lever-A.stp", "cad/occt/screw.step"})
+  for (const char* name : {"cad/o2ac/03-PANEL2.step", "cad/o2ac/02-PANEL.step", "cad/occt/bm2_ec_lever-A.stp",
+                           "cad/occt/screw.step", "cad/occt/xr1-tc-plt.stp"})
     if (const fs::path path = test::shared_data(name); fs::exists(path)) parts.push_back(path);
   return parts;
 }
@@ -123,6 +126,44 @@ TEST(OnePart, IsTheSameAsStepAndAsTriangles) {
       expect_same(truth, primitives_of(other), TessellationOptions{}.chord_error_mm);
     }
   }
+}
+
+/// Area of the primitives of `truth` that `seen` explains by the same surfaces, triangle by triangle, over their area;
+/// and the other way round, over what lies on elementary faces at all.
+struct Agreement {
+  double found = 0, right = 0;
+};
+
+Agreement agreement(const Mesh& mesh, double limit) {
+  Mesh bare = mesh;
+  bare.faces.clear();
+  bare.face_of_triangle.clear();
+  const Surfels exact = surfels_from_mesh(mesh), triangles = surfels_from_mesh(bare);
+  const Primitives truth = segment(exact), seen = segment(triangles);
+  double both = 0, of_truth = 0, of_seen = 0;
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    const int a = truth.label_of_surfel[t], b = seen.label_of_surfel[t];
+    if (a == 0) continue;
+    of_truth += exact.area_mm2[t];
+    if (b == 0) continue;
+    of_seen += exact.area_mm2[t];
+    if (apart_mm(truth.items[static_cast<std::size_t>(a - 1)], seen.items[static_cast<std::size_t>(b - 1)]) <= limit)
+      both += exact.area_mm2[t];
+  }
+  return {both / of_truth, both / of_seen};
+}
+
+TEST(OnePart, IsTheSameInAnyTessellation) {
+  for (const fs::path& step : sample_parts())
+    for (const double chord_mm : {0.02, 0.1, 0.5})
+      for (const double angle : {10 * kDegree, 20 * kDegree}) {
+        SCOPED_TRACE(step.string() + ", chord " + std::to_string(chord_mm) + ", angle " + std::to_string(angle));
+        const Mesh mesh = read_step(step, {.chord_error_mm = chord_mm, .angle = angle});
+        const Agreement a = agreement(mesh, std::max(mesh.chord_error_mm, 1e-3));
+        // Where the mesher spans a quarter of a fillet by one facet nothing is left of its roundness.
+        EXPECT_GE(a.found, chord_mm < 0.05 ? 0.98 : 0.90);
+        EXPECT_GE(a.right, 0.985);
+      }
 }
 
 TEST(OnePart, AssemblyOfTrueCylindersAndOfSplines) {

@@ -63,7 +63,7 @@ TEST(PaperRecognize, FindsLyingAlternatorsAndSaysWhy) {
     }
   }
   // How often it succeeds is measured by `tribin bench`; that it works at all is tested here.
-  EXPECT_GE(found, 1);
+  EXPECT_GE(found, 3);
   EXPECT_LE(answered, tried);  // one object, one answer at most
 }
 
