@@ -47,6 +47,7 @@ struct Fit {
 
 struct FitOptions {
   bool hold_radius = false;  ///< keep surface.radius
+  bool hold_axis = false;    ///< keep the direction of surface.axis
   bool cone = false;         ///< let the half angle go
   double start_mm = 0;       ///< robust scale to start at, 0 = already close
   int max_surfels = 4000;    ///< fit every k-th beyond that

@@ -215,10 +215,10 @@ Surface stepped(const Surface& surface, const Column& step) {
   return out;
 }
 
-void hold(NormalEquations& equations, const std::vector<int>& active, bool hold_radius) {
+void hold(NormalEquations& equations, const std::vector<int>& active, const FitOptions& options) {
   for (int i = 0; i < kParameters; ++i) {
-    const bool free = std::find(active.begin(), active.end(), i) != active.end() && !(hold_radius && i == 4);
-    if (free) continue;
+    const bool held = (options.hold_radius && i == 4) || (options.hold_axis && i < 2);
+    if (!held && std::find(active.begin(), active.end(), i) != active.end()) continue;
     equations.h.row(i).setZero();
     equations.h.col(i).setZero();
     equations.h(i, i) = 1;

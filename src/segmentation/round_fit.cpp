@@ -158,15 +158,16 @@ double rms_of(const std::vector<double>& residual, double scale) {
 }
 
 /// Covariance of what was fitted. \param inflation  data per datum that is independent. \return whether there is one.
-bool covariance_of(const NormalEquations& equations, const std::vector<int>& active, bool hold_radius, double inflation,
-                   Matrix6& out) {
+bool covariance_of(const NormalEquations& equations, const std::vector<int>& active, const FitOptions& options,
+                   double inflation, Matrix6& out) {
   const Eigen::LDLT<Square> solver(equations.h);
   if (solver.info() != Eigen::Success || solver.vectorD().minCoeff() <= 0) return false;
   const Square covariance = inflation * solver.solve(Square::Identity());
+  const auto held = [&](int i) { return (options.hold_radius && i == 4) || (options.hold_axis && i < 2); };
   out.setZero();
   for (int a : active)
     for (int b : active)
-      if (a < 6 && b < 6 && !(hold_radius && (a == 4 || b == 4))) out(a, b) = covariance(a, b);
+      if (a < 6 && b < 6 && !held(a) && !held(b)) out(a, b) = covariance(a, b);
   return true;
 }
 
@@ -195,7 +196,7 @@ Fit fit_round(const Surfels& surfels, std::span<const std::uint32_t> support, co
   constexpr int kMaxIterations = 40;
   for (int iteration = 0, settled = 0; iteration < kMaxIterations && settled < 2; ++iteration) {
     NormalEquations equations = weigh(at, mu);
-    hold(equations, at.active, options.hold_radius);
+    hold(equations, at.active, options);
     const double cost = robust_cost(at.residual, mu);
     bool improved = false;
     double step = 0;
@@ -240,12 +241,12 @@ Fit fit_round(const Surfels& surfels, std::span<const std::uint32_t> support, co
   fit.scale = residual_scale(surfels, support, s);
   fit.rms_sigma = rms_of(at.residual, fit.scale);
   NormalEquations equations = weigh(at, kWidth * fit.scale);
-  hold(equations, at.active, options.hold_radius);
+  hold(equations, at.active, options);
   // Correlated noise averages down less than the number of data says; a sparse sample is less correlated.
   const double share = std::min(1.0, static_cast<double>(data.size()) / static_cast<double>(support.size()));
   const double inflation = std::max(1.0, correlation_inflation(surfels) * share);
-  if (!covariance_of(equations, at.active, options.hold_radius,
-                     inflation * std::max(1.0, fit.rms_sigma * fit.rms_sigma), fit.covariance))
+  if (!covariance_of(equations, at.active, options, inflation * std::max(1.0, fit.rms_sigma * fit.rms_sigma),
+                     fit.covariance))
     return fit;
   fit.surface = s;
   fit.valid = true;
@@ -280,7 +281,7 @@ bool refine_on_pixels(const Surfels& surfels, std::span<const std::uint32_t> sup
     scale =
         scale_of(at.residual, 2.0, scratch);  // pixels scatter by their sigma; the waves below it are theirs as well
     equations = weigh(at, kWidth * scale);
-    hold(equations, at.active, options.hold_radius);
+    hold(equations, at.active, options);
     const Column x = -equations.h.ldlt().solve(equations.g);
     if (!x.allFinite()) return false;
     s = stepped(s, x);
@@ -290,8 +291,8 @@ bool refine_on_pixels(const Surfels& surfels, std::span<const std::uint32_t> sup
   const double rms = rms_of(at.residual, scale);
   const double share = std::min(1.0, static_cast<double>(at.residual.size()) / points);
   Matrix6 covariance;
-  if (!covariance_of(equations, at.active, options.hold_radius,
-                     std::max(1.0, information * share) * std::max(1.0, rms * rms), covariance))
+  if (!covariance_of(equations, at.active, options, std::max(1.0, information * share) * std::max(1.0, rms * rms),
+                     covariance))
     return false;
   fit.surface = s;
   fit.covariance = covariance;

@@ -47,7 +47,7 @@ double robust_cost(const std::vector<double>& residual, double mu);
 /// A surface moved by a step of its parameters.
 Surface stepped(const Surface& surface, const Column& step);
 
-/// Freezes the parameters that are not active, and the radius where it is held: unit rows and columns.
-void hold(NormalEquations& equations, const std::vector<int>& active, bool hold_radius);
+/// Freezes the parameters that are not active, and those that the options hold: unit rows and columns.
+void hold(NormalEquations& equations, const std::vector<int>& active, const FitOptions& options);
 
 }  // namespace tribin::segmentation_detail

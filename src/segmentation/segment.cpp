@@ -159,9 +159,9 @@ Primitives segment(const Surfels& given, const SegmentationOptions& options) {
 
   if (points_alone) explain_by_consensus(scene, limits, found);
   if (!points_alone) explain(scene, limits, out.spaces, found);
-  if (surfels.point_set != nullptr) explain_rest(scene, limits, out.spaces, found);
+  if (surfels.point_set != nullptr && !points_alone) explain_rest(scene, limits, out.spaces, found);
 
-  if (surfels.mesh == nullptr) merge_pieces(scene, found);
+  if (surfels.mesh == nullptr && !points_alone) merge_pieces(scene, found);
 
   // Supports in order of their surfels, by one pass over the labels; then the largest first.
   for (FoundSurface& f : found) f.support.clear();
@@ -171,7 +171,7 @@ Primitives segment(const Surfels& given, const SegmentationOptions& options) {
   out.items.resize(found.size());
   parallel_each(static_cast<int>(found.size()), [&](int i) {
     FoundSurface& f = found[static_cast<std::size_t>(i)];
-    if (surfels.mesh == nullptr && f.fit.surface.type != PrimitiveType::plane) polish(scene, f);
+    if (surfels.mesh == nullptr && !points_alone && f.fit.surface.type != PrimitiveType::plane) polish(scene, f);
     out.items[static_cast<std::size_t>(i)] = primitive_of(surfels, f);
   });
   std::stable_sort(out.items.begin(), out.items.end(),
