@@ -55,6 +55,16 @@ void clean_up_on_signal() {
   }).detach();
 }
 
+RemovedOnSignal::RemovedOnSignal(const fs::path& folder) : folder_(fs::absolute(folder)) {
+  const std::lock_guard lock(registry().mutex);
+  registry().folders.insert(folder_);
+}
+
+RemovedOnSignal::~RemovedOnSignal() {
+  const std::lock_guard lock(registry().mutex);
+  registry().folders.erase(folder_);
+}
+
 StagedOutput::StagedOutput(const fs::path& final_place) : final_(fs::absolute(final_place).lexically_normal()) {
   if (!final_.has_filename()) final_ = final_.parent_path();  // "out/" means the folder out
   const fs::path parent = final_.parent_path();

@@ -30,6 +30,18 @@ class StagedOutput {
   std::filesystem::path folder_;
 };
 
+/// A folder that is removed when a signal ends the program while this object lives.
+class RemovedOnSignal {
+ public:
+  explicit RemovedOnSignal(const std::filesystem::path& folder);
+  ~RemovedOnSignal();
+  RemovedOnSignal(const RemovedOnSignal&) = delete;
+  RemovedOnSignal& operator=(const RemovedOnSignal&) = delete;
+
+ private:
+  std::filesystem::path folder_;
+};
+
 /// Writes text to a file (by StagedOutput), or to stdout for "-".
 void write_text(const std::string& where, const std::string& text);
 

@@ -6,7 +6,7 @@
 #include "tribin/core/error.hpp"
 #include "tribin/io/cad_files.hpp"
 #ifdef TRIBIN_WITH_SIM
-#include "tribin/sim/table_dataset.hpp"
+#include "tribin/sim/dataset.hpp"
 #endif
 
 namespace tribin::cli {
@@ -21,9 +21,8 @@ struct Options {
 
 #ifdef TRIBIN_WITH_SIM
 int run(const Options& options, const Context& context) {
-  if (options.kind != "table")
-    throw Error(ErrorCode::bad_option, "--kind " + options.kind + ": not built yet; wanted table");
-  sim::TableDatasetOptions dataset;
+  sim::DatasetOptions dataset;
+  dataset.kind = sim::scene_kind_of(options.kind);
   dataset.level = sim::level_of(options.level);
   dataset.scenes = options.scenes;
   dataset.seed = options.seed;
@@ -31,15 +30,14 @@ int run(const Options& options, const Context& context) {
     dataset.parts.push_back(read_cad(part.file, {.unit = length_unit_from_name(options.unit)}));
     dataset.parts.back().name = part.name;
   }
-  StagedOutput staged(options.out);
   {
+    const RemovedOnSignal unfinished(sim::unfinished_scenes(options.out));
     Progress progress("Simulating", options.scenes, context.quiet);
     dataset.progress = [&](int done, int) { progress.done(done); };
-    sim::simulate_table_dataset(dataset, staged.path());
+    sim::simulate_dataset(dataset, options.out);
   }
-  staged.publish();
-  std::printf("%s: %d scene%s of level %s\n", options.out.c_str(), options.scenes, options.scenes == 1 ? "" : "s",
-              options.level.c_str());
+  std::printf("%s: %d scene%s of kind %s, level %s\n", options.out.c_str(), options.scenes,
+              options.scenes == 1 ? "" : "s", options.kind.c_str(), options.level.c_str());
   return 0;
 }
 #else
@@ -51,15 +49,17 @@ int run(const Options&, const Context&) { refuse_without_simulation(); }
 void add_simulate(CLI::App& app, Context& context) {
   auto options = std::make_shared<Options>();
   CLI::App* command = add_command(
-      app, context, "simulate", "Make scans of parts on a table, with their truth, as a BOP data set",
-      "tribin simulate --part pulley.step --part shaft.stl --kind table --level easy -o scenes --scenes 10");
+      app, context, "simulate", "Make scans of parts on a table or in a bin, with their truth, as a BOP data set",
+      "tribin simulate --part pulley.step --part shaft.stl --kind bin --level dense -o scenes --scenes 10");
   command->add_option("--part", options->parts, "CAD of a part; repeat it for more")
       ->required()
       ->type_name("[NAME=]CAD")
       ->allow_extra_args(false);
-  command->add_option("--kind", options->kind, "table")->type_name("K");
+  command->add_option("--kind", options->kind, "table: side by side; bin: a heap made by physics")->type_name("K");
   command->add_option("--level", options->level, "easy, dense, hard: parts, noise, tilt, lost pixels")->type_name("L");
-  command->add_option("-o", options->out, "Folder of the data set")->required()->type_name("DIR");
+  command->add_option("-o", options->out, "Folder of the data set; scenes that it holds are kept")
+      ->required()
+      ->type_name("DIR");
   command->add_option("--scenes", options->scenes, "How many")->check(CLI::Range(1, 1000000))->type_name("N");
   command->add_option("--seed", options->seed, "The same seed gives the same scenes")->type_name("S");
   command->add_option("--unit", options->unit, "Unit of CAD files that name none: mm, cm, m, inch")->type_name("U");

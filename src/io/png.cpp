@@ -107,7 +107,7 @@ Image<T> decode_pixels(const FileBytes& file, const Header& header) {
 }
 
 template <class T>
-std::string encode_pixels(const Image<T>& image) {
+std::string encode_pixels(const Image<T>& image, int channels = 1) {
   std::string out;
   std::vector<png_bytep> rows(image.height);
   for (int v = 0; v < image.height; ++v) {
@@ -122,7 +122,8 @@ std::string encode_pixels(const Image<T>& image) {
     throw Error(ErrorCode::internal, std::string("PNG writer: ") + messages.message);
   }
   png_set_write_fn(png, &out, on_write, nullptr);
-  png_set_IHDR(png, info, image.width, image.height, 8 * sizeof(T), PNG_COLOR_TYPE_GRAY, PNG_INTERLACE_NONE,
+  png_set_IHDR(png, info, image.width / channels, image.height, 8 * sizeof(T),
+               channels == 3 ? PNG_COLOR_TYPE_RGB : PNG_COLOR_TYPE_GRAY, PNG_INTERLACE_NONE,
                PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
   png_set_compression_level(png, 3);  // 4 times as fast as the default, 5 % larger
   png_write_info(png, info);
@@ -151,5 +152,6 @@ GreyImage decode_grey_png(const FileBytes& file) {
 
 std::string encode_png8(const Image<std::uint8_t>& image) { return encode_pixels(image); }
 std::string encode_png16(const Image<std::uint16_t>& image) { return encode_pixels(image); }
+std::string encode_png16_rgb(const Image<std::uint16_t>& interleaved) { return encode_pixels(interleaved, 3); }
 
 }  // namespace tribin::io

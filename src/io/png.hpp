@@ -28,4 +28,7 @@ std::string encode_png8(const Image<std::uint8_t>& image);
 /// Encodes a 16-bit grey PNG.
 std::string encode_png16(const Image<std::uint16_t>& image);
 
+/// Encodes a 16-bit RGB PNG from an image of three times the width: red, green, blue of each pixel in turn.
+std::string encode_png16_rgb(const Image<std::uint16_t>& interleaved);
+
 }  // namespace tribin::io

@@ -1,9 +1,8 @@
 #include "tribin/sim/bop_writer.hpp"
 
-#include <png.h>
-
 #include <cmath>
 #include <cstdio>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "io/atomic_file.hpp"
@@ -43,19 +42,9 @@ ordered_json row_wise(const Eigen::MatrixBase<Derived>& m) {
 ordered_json intrinsics(const PinholeCamera& c) { return {c.fx, 0, c.cx, 0, c.fy, c.cy, 0, 0, 1}; }
 
 void write_mask(const fs::path& path, const Image<std::int16_t>& bodies, int body) {
-  std::vector<std::uint8_t> mask(bodies.size());
-  for (std::size_t i = 0; i < mask.size(); ++i) mask[i] = bodies.data[i] == body ? 255 : 0;
-  png_image image{};
-  image.version = PNG_IMAGE_VERSION;
-  image.width = static_cast<png_uint_32>(bodies.width);
-  image.height = static_cast<png_uint_32>(bodies.height);
-  image.format = PNG_FORMAT_GRAY;
-  png_alloc_size_t size = PNG_IMAGE_PNG_SIZE_MAX(image);
-  std::string bytes(size, '\0');
-  if (!png_image_write_to_memory(&image, bytes.data(), &size, 0, mask.data(), 0, nullptr))
-    throw Error(ErrorCode::internal, path.string() + ": " + image.message);
-  bytes.resize(size);
-  io::write_file(path, bytes);
+  Image<std::uint8_t> mask(bodies.width, bodies.height);
+  for (std::size_t i = 0; i < mask.size(); ++i) mask.data[i] = bodies.data[i] == body ? 255 : 0;
+  io::write_file(path, io::encode_png8(mask));
 }
 
 Image<std::uint16_t> depth_steps(const Image<float>& z_mm, double scale) {
@@ -69,6 +58,29 @@ Image<std::uint16_t> depth_steps(const Image<float>& z_mm, double scale) {
     steps.data[i] = static_cast<std::uint16_t>(value);
   }
   return steps;
+}
+
+/// The images of truth/. \param label  of each body, 0 = no part.
+void write_truth(const fs::path& folder, const SimulatedScan& s, const std::vector<int>& label, double depth_scale) {
+  make_directory(folder);
+  const int w = s.body.width, h = s.body.height;
+  Image<float> depth = s.true_z;
+  Image<std::uint16_t> labels(w, h, 0), faces(w, h, 0), normals(3 * w, h, 0);
+  for (std::size_t i = 0; i < s.body.size(); ++i) {
+    const int k = s.body.data[i] >= 0 ? label[s.body.data[i]] : 0;
+    if (k == 0) {
+      depth.data[i] = std::numeric_limits<float>::quiet_NaN();
+      continue;
+    }
+    labels.data[i] = static_cast<std::uint16_t>(k);
+    if (s.face.data[i] <= 65535) faces.data[i] = static_cast<std::uint16_t>(s.face.data[i]);
+    for (int c = 0; c < 3; ++c)
+      normals.data[3 * i + c] = static_cast<std::uint16_t>(std::lround((s.normal.data[i][c] + 1) * 32767.5));
+  }
+  io::write_file(folder / "depth.png", io::encode_png16(depth_steps(depth, depth_scale)));
+  io::write_file(folder / "label.png", io::encode_png16(labels));
+  io::write_file(folder / "face.png", io::encode_png16(faces));
+  io::write_file(folder / "normal.png", io::encode_png16_rgb(normals));
 }
 
 }  // namespace
@@ -103,20 +115,21 @@ void write_bop_models(const fs::path& dataset, const std::vector<Mesh>& parts, c
                                        {"cam_K", intrinsics(camera)}});
 }
 
-void write_bop_scene(const fs::path& dataset, int scene, const BopImage& image, int classes, double depth_scale) {
+void write_bop_scene(const fs::path& folder, const BopImage& image, int classes, double depth_scale) {
   const SimulatedScan& s = *image.simulated;
   TRIBIN_ASSERT(image.object_of_body.size() == s.bodies.size());
-  const fs::path folder = dataset / "test" / numbered("%06d", scene);
   make_directory(folder / "depth");
   make_directory(folder / "mask_visib");
   io::write_file(folder / "depth" / "000000.png", io::encode_png16(depth_steps(s.scan.z_mm, depth_scale)));
 
   ordered_json gt = ordered_json::array(), info = ordered_json::array();
+  std::vector<int> label(s.bodies.size(), 0);
   for (std::size_t b = 0; b < s.bodies.size(); ++b) {
     if (image.object_of_body[b] == 0) continue;
     const BodyTruth& t = s.bodies[b];
     write_mask(folder / "mask_visib" / numbered("000000_%06d.png", static_cast<int>(gt.size())), s.body,
                static_cast<int>(b));
+    label[b] = static_cast<int>(gt.size()) + 1;
     gt.push_back({{"cam_R_m2c", row_wise(t.camera_from_body.linear())},
                   {"cam_t_m2c", row_wise(t.camera_from_body.translation())},
                   {"obj_id", image.object_of_body[b]}});
@@ -140,6 +153,7 @@ void write_bop_scene(const fs::path& dataset, int scene, const BopImage& image, 
   ordered_json all = ordered_json::array();
   for (int k = 1; k <= classes; ++k) all.push_back(k);
   write_json(folder / "scene_parts.json", {{"0", all}});
+  write_truth(folder / "truth", s, label, depth_scale);
 }
 
 }  // namespace tribin::sim

@@ -8,6 +8,12 @@
 #include "tribin/core/error.hpp"
 
 namespace tribin::sim {
+namespace {
+
+// Rays leave a surface this far off [mm]: five times what float leaves of a point at 1 m and a chord of 0.02 mm.
+constexpr double kOffSurface = 0.05;
+
+}  // namespace
 
 struct RayScene::State {
   RTCDevice device = nullptr;
@@ -53,14 +59,17 @@ RayScene::RayScene(const std::vector<Body>& bodies) : state_(std::make_unique<St
 
 RayScene::~RayScene() = default;
 
-Hit RayScene::first_hit(const Vec3& ray) const {
+Hit RayScene::hit(const Vec3& origin, const Vec3& direction, double nearest) const {
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   RTCRayHit query{};
-  query.ray.dir_x = static_cast<float>(ray.x());
-  query.ray.dir_y = static_cast<float>(ray.y());
-  query.ray.dir_z = static_cast<float>(ray.z());
-  query.ray.tnear = 1.0f;  // mm in front of the camera
+  query.ray.org_x = static_cast<float>(origin.x());
+  query.ray.org_y = static_cast<float>(origin.y());
+  query.ray.org_z = static_cast<float>(origin.z());
+  query.ray.dir_x = static_cast<float>(direction.x());
+  query.ray.dir_y = static_cast<float>(direction.y());
+  query.ray.dir_z = static_cast<float>(direction.z());
+  query.ray.tnear = static_cast<float>(nearest / direction.norm());
   query.ray.tfar = std::numeric_limits<float>::infinity();
   query.ray.mask = 0xFFFFFFFFu;
   query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
@@ -73,11 +82,15 @@ Hit RayScene::first_hit(const Vec3& ray) const {
   const auto& t = state_->meshes[hit.body]->triangles[hit.triangle];
   const auto& v = state_->vertices[hit.body];
   const Vec3 n = (v[t[1]] - v[t[0]]).cross(v[t[2]] - v[t[0]]);
-  const double along = n.dot(ray);
-  hit.z = std::abs(along) > 1e-12 * n.norm() ? n.dot(v[t[0]]) / along : query.ray.tfar;
+  const double along = n.dot(direction);
+  hit.t = std::abs(along) > 1e-12 * n.norm() * direction.norm() ? n.dot(v[t[0]] - origin) / along : query.ray.tfar;
   hit.normal = (along > 0 ? Vec3(-n) : n).normalized();
   return hit;
 }
+
+Hit RayScene::first_hit(const Vec3& ray) const { return hit(Vec3::Zero(), ray, 1.0); }
+
+Hit RayScene::next_hit(const Vec3& point, const Vec3& direction) const { return hit(point, direction, kOffSurface); }
 
 bool RayScene::occluded(const Vec3& point, const Vec3& eye) const {
   RTCIntersectContext context;
@@ -90,8 +103,7 @@ bool RayScene::occluded(const Vec3& point, const Vec3& eye) const {
   ray.dir_x = static_cast<float>(d.x());
   ray.dir_y = static_cast<float>(d.y());
   ray.dir_z = static_cast<float>(d.z());
-  // Off the surface itself by 0.05 mm: five times what float leaves of a point at 1 m and a chord of 0.02 mm.
-  ray.tnear = static_cast<float>(0.05 / d.norm());
+  ray.tnear = static_cast<float>(kOffSurface / d.norm());
   ray.tfar = 1.0f;
   ray.mask = 0xFFFFFFFFu;
   rtcOccluded1(state_->scene, &context, &ray);

@@ -29,6 +29,7 @@ void check(const StructuredLight& s) {
   want(s.steps >= 3, "steps >= 3");
   want(s.image_noise >= 0 && s.noise_mm >= 0, "image_noise and noise_mm >= 0");
   want(s.noise_correlation_px >= 0 && s.noise_correlation_px <= 5, "noise_correlation_px in [0, 5]");
+  want(s.mirror_share >= 0 && s.mirror_share <= 1, "mirror_share in [0, 1]");
   want(s.lost_share >= 0 && s.lost_share < 1, "lost_share in [0, 1)");
   want(s.facing_modulation > 0 && s.reference_mm > 0, "facing_modulation and reference_mm > 0");
 }
@@ -46,12 +47,11 @@ double facing_sigma(const StructuredLight& s) {
          std::sqrt(2.0 / s.steps) * s.image_noise / s.facing_modulation;
 }
 
-Return light_of(const RayScene& scene, const StructuredLight& s, const Hit& hit, const Vec3& ray, const Body& body) {
-  if (hit.body < 0) return {};
-  const Vec3 point = ray * hit.z, projector(s.baseline_mm, 0, 0);
-  const Vec3 to_light = projector - point;
-  const Vec3 l = to_light.normalized(), e = -ray.normalized();
-  const double cos_light = hit.normal.dot(l), cos_eye = hit.normal.dot(e);
+/// \param e  unit, from the point to who looks at it.
+Return light_of(const RayScene& scene, const StructuredLight& s, const Vec3& point, const Vec3& normal, const Vec3& e,
+                const Body& body) {
+  const Vec3 projector(s.baseline_mm, 0, 0), to_light = projector - point, l = to_light.normalized();
+  const double cos_light = normal.dot(l), cos_eye = normal.dot(e);
   if (cos_light <= 0 || scene.occluded(point, projector)) return {0, Invalid::shadow};
   // In units of a facing surface on the axis at the reference distance, which the projector meets slightly aslant.
   const double reference = std::hypot(s.reference_mm, s.baseline_mm);
@@ -61,11 +61,17 @@ Return light_of(const RayScene& scene, const StructuredLight& s, const Hit& hit,
   if (std::min(cos_light, cos_eye) < std::cos(s.max_incidence)) return {modulation, Invalid::grazing};
   // A lobe about the mirror direction, Blinn's with exponent 200 (machined metal: half width 6 deg), that fills the
   // camera's range once it adds 1.5 times the diffuse light of a facing surface.
-  const double mirror = std::pow(std::max(0.0, hit.normal.dot((l + e).normalized())), 200);
+  const double mirror = std::pow(std::max(0.0, normal.dot((l + e).normalized())), 200);
   if (body.shine * s.highlight * mirror * falloff * falloff > 0.45 + 0.1 * (1 - cos_light))
     return {modulation, Invalid::saturated};
   if (modulation < s.min_modulation) return {modulation, Invalid::dark};
   return {modulation, Invalid::measured};
+}
+
+Return light_of(const RayScene& scene, const StructuredLight& s, const Hit& hit, const Vec3& ray,
+                const std::vector<Body>& bodies) {
+  if (hit.body < 0) return {};
+  return light_of(scene, s, ray * hit.t, hit.normal, -ray.normalized(), bodies[hit.body]);
 }
 
 /// The value that a standard normal exceeds with this probability.
@@ -93,7 +99,7 @@ Measured mixed_pixel(const RayScene& scene, const StructuredLight& s, const std:
   const Vec3 ray = s.camera.ray(u, v);
   // Column of the projector that lights depth z on a ray: f_p (x / z - B / z), with x / z from the ray.
   const auto column = [&](const Vec3& r, double z) { return s.projector_focal_px * (r.x() - s.baseline_mm / z); };
-  const double at = column(ray, middle.z);
+  const double at = column(ray, middle.t);
   std::complex<double> sum = 0;
   int count = 0;
   const auto add = [&](double x, const Return& light) {
@@ -110,9 +116,9 @@ Measured mixed_pixel(const RayScene& scene, const StructuredLight& s, const std:
       continue;
     }
     // The sub-ray's own place in the image belongs to the pixel's middle: the phase is compared at equal x / z.
-    add(column(r, hit.z) - s.projector_focal_px * (r.x() - ray.x()), light_of(scene, s, hit, r, bodies[hit.body]));
+    add(column(r, hit.t) - s.projector_focal_px * (r.x() - ray.x()), light_of(scene, s, hit, r, bodies));
   }
-  Measured result{middle.z, middle_light};
+  Measured result{middle.t, middle_light};
   result.light.modulation = std::abs(sum) / count;
   if (result.light.state != Invalid::measured) return result;
   if (result.light.modulation < s.min_modulation) {
@@ -122,6 +128,38 @@ Measured mixed_pixel(const RayScene& scene, const StructuredLight& s, const std:
   const double x = at + std::arg(sum) / scale;
   result.z = s.baseline_mm / (ray.x() - x / s.projector_focal_px);
   return result;
+}
+
+/// Adds the fringes that a pixel sees in its surface as in a mirror. The stronger of the two tells the order of the
+/// fringe, as a code would; in the projector's shadow that may be the mirrored one: a ghost.
+void add_mirrored(const RayScene& scene, const StructuredLight& s, const std::vector<Body>& bodies, const Vec3& ray,
+                  const Hit& hit, Measured& m) {
+  const double share = s.mirror_share * bodies[hit.body].shine;
+  if (share <= 0 || (m.light.state != Invalid::measured && m.light.state != Invalid::shadow)) return;
+  const Vec3 point = ray * hit.t, on = ray - 2 * ray.dot(hit.normal) * hit.normal;
+  const Hit second = scene.next_hit(point, on);
+  if (second.body < 0) return;
+  const Vec3 q = point + second.t * on;
+  const Return light = light_of(scene, s, q, second.normal, -on.normalized(), bodies[second.body]);
+  if (light.state != Invalid::measured) return;
+  const double own = m.light.state == Invalid::measured ? m.light.modulation : 0, other = share * light.modulation;
+  const double scale = 2 * kPi / s.fringe_period_px;
+  const double x_own = s.projector_focal_px * (ray.x() - s.baseline_mm / m.z),
+               x_other = s.projector_focal_px * (q.x() - s.baseline_mm) / q.z();
+  const std::complex<double> sum = own + other * std::polar(1.0, scale * (x_other - x_own));
+  if (std::abs(sum) < s.min_modulation) {
+    if (m.light.state == Invalid::measured) m.light = {std::abs(sum), Invalid::dark};
+    return;
+  }
+  const double base = own >= other ? x_own : x_other;
+  const double x = base + std::arg(sum * std::polar(1.0, scale * (x_own - base))) / scale;
+  const double z = s.baseline_mm / (ray.x() - x / s.projector_focal_px);
+  m.light = {std::abs(sum), Invalid::measured};
+  // A decoder knows its working range: half to twice the distance.
+  if (z > 0.5 * s.reference_mm && z < 2 * s.reference_mm)
+    m.z = z;
+  else
+    m.light.state = Invalid::out_of_view;
 }
 
 /// Does the surface break between this pixel and a neighbour? `limit` [mm] on the second difference of z.
@@ -208,7 +246,7 @@ SimulatedScan simulate_scan(const std::vector<Body>& bodies, const StructuredLig
         if (hit.body < 0) continue;
         const Mesh& mesh = *bodies[hit.body].mesh;
         out.body(u, v) = static_cast<std::int16_t>(hit.body);
-        out.true_z(u, v) = static_cast<float>(hit.z);
+        out.true_z(u, v) = static_cast<float>(hit.t);
         out.normal(u, v) = hit.normal.cast<float>();
         out.face(u, v) = mesh.face_of_triangle.empty() ? static_cast<std::int32_t>(hit.triangle) + 1
                                                        : mesh.face_of_triangle[hit.triangle];
@@ -234,10 +272,11 @@ SimulatedScan simulate_scan(const std::vector<Body>& bodies, const StructuredLig
         const Hit& hit = hits(u, v);
         if (hit.body < 0) continue;
         const Vec3 ray = camera.ray(u, v);
-        Measured m{hit.z, light_of(scene, sensor, hit, ray, bodies[hit.body])};
+        Measured m{hit.t, light_of(scene, sensor, hit, ray, bodies)};
         // A break is more than the noise shows: below it, mixing changes nothing that one could see.
         if (sensor.mixed_pixels && on_edge(out, u, v, std::max(0.05, 2 * sigma0)))
           m = mixed_pixel(scene, sensor, bodies, u, v, hit, m.light);
+        if (sensor.mirror_share > 0) add_mirrored(scene, sensor, bodies, ray, hit, m);
         if (!blots.empty() && blots(u, v) > lost_above) m.light.state = Invalid::lost;
         out.scan.invalid_reason(u, v) = static_cast<std::uint8_t>(m.light.state);
         if (m.light.state != Invalid::measured) continue;

@@ -10,7 +10,7 @@
 
 #include "tribin/core/error.hpp"
 #include "tribin/io/cad_files.hpp"
-#include "tribin/sim/table_dataset.hpp"
+#include "tribin/sim/dataset.hpp"
 
 namespace tribin::sim {
 namespace {
@@ -72,11 +72,11 @@ TEST(CramerRaoBound, SaysWhenThePixelsLeaveADirectionFree) {
   EXPECT_THROW(cramer_rao_bound(scene.simulated, 0, 1), Error);  // the table slides on itself
 }
 
-TEST(TableDataset, IsReadableAsBop) {
+TEST(Dataset, IsReadableAsBop) {
   const fs::path directory = fs::path(testing::TempDir()) / "tribin_table_dataset";
   fs::remove_all(directory);
-  simulate_table_dataset(
-      {.parts = {part("alternator_a"), part("alternator_b")}, .scenes = 1, .seed = 3, .progress = {}}, directory);
+  simulate_dataset({.parts = {part("alternator_a"), part("alternator_b")}, .scenes = 1, .seed = 3, .progress = {}},
+                   directory);
   const auto json = [&](const std::string& name) { return nlohmann::json::parse(std::ifstream(directory / name)); };
   const auto gt = json("test/000001/scene_gt.json")["0"], info = json("test/000001/scene_gt_info.json")["0"];
   ASSERT_GE(gt.size(), 1u);
@@ -90,7 +90,7 @@ TEST(TableDataset, IsReadableAsBop) {
   EXPECT_TRUE(fs::exists(directory / "test/000001/depth/000000.png"));
   EXPECT_EQ(json("models/models_info.json").size(), 2u);
   EXPECT_EQ(json("test/000001/scene_camera.json")["0"]["cam_K"].size(), 9u);
-  EXPECT_THROW(simulate_table_dataset({}, directory), Error);
+  EXPECT_THROW(simulate_dataset({}, directory), Error);
   EXPECT_THROW(level_of("heavy"), Error);
   fs::remove_all(directory);
 }

@@ -25,6 +25,7 @@ struct StructuredLight {
   double min_modulation = 5;            ///< below it a pixel is not measured
   double max_incidence = 75 * kDegree;  ///< to camera or projector; beyond it a pixel is not measured
   double highlight = 0.5;               ///< 0 none .. 1: strength of mirror highlights, which saturate
+  double mirror_share = 0;              ///< share of the light that shiny bodies throw on as clean mirrors, once
   double systematic = 0.0002;           ///< largest relative depth error, quadratic over the image
   double noise_mm = 0;                  ///< > 0: sd of z on a facing surface of albedo 0.5 at reference_mm, in place of
                                         ///< the one that image_noise gives
@@ -64,9 +65,8 @@ struct SimulatedScan {
 
 /// Casts the scene, lights it, and measures it as a structured-light sensor does: projector shadow, noise that grows
 /// with distance, incidence and darkness (correlated over the pixels), mixed pixels, drop-out by grazing and mirror
-/// angles, a smooth systematic error. The same bytes for any number of threads.
-/// \param bodies  in the camera frame; a table is a body too.
-/// \param seed    of noise and systematic error.
+/// angles, fringes of other surfaces seen in shiny ones, a smooth systematic error. The same bytes for any number of
+/// threads. \param bodies  in the camera frame; a table is a body too. \param seed    of noise and systematic error.
 /// \throws Error  out_of_range, naming the setting, when the sensor makes no sense.
 /// \source        noise law: sigma_z = z^2 / (B f_p) * period / (2 pi) * sqrt(2 / steps) * image_noise / modulation.
 SimulatedScan simulate_scan(const std::vector<Body>& bodies, const StructuredLight& sensor, std::uint64_t seed);

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "tribin/cad/mesh.hpp"
+#include "tribin/sim/levels.hpp"
+
+namespace tribin::sim {
+
+enum class SceneKind {
+  table,  ///< parts side by side, each in one of its stable rests
+  bin     ///< a heap that physics made
+};
+
+/// \throws Error bad_option for anything but table and bin.
+SceneKind scene_kind_of(const std::string& name);
+
+struct DatasetOptions {
+  std::vector<Mesh> parts;  ///< with their names; object k + 1 of the data set is parts[k]
+  SceneKind kind = SceneKind::table;
+  Level level = Level::easy;
+  int scenes = 1;                                      ///< >= 1
+  std::uint64_t seed = 1;                              ///< scene i depends on parts, kind, level, seed and i alone
+  std::function<void(int done, int scenes)> progress;  ///< called after each scene, by one thread at a time, if set
+};
+
+/// Scenes with their truth, as a BOP data set in `directory` (made if absent). A scene's folder appears when it is
+/// whole; scenes that are there are kept, so that a run that was broken off, or is asked for more scenes, goes on. One
+/// scene a core. On tables, parts that find no room are left out. \throws Error bad_option (no part, scenes < 1, two
+/// equal names, the folder holds another data set),
+///               too_little_data (a part without volume), bad_input (the directory cannot be written).
+void simulate_dataset(const DatasetOptions& options, const std::filesystem::path& directory);
+
+/// Where scenes are written until they are whole: below the data set's folder. What lies there can be removed.
+std::filesystem::path unfinished_scenes(const std::filesystem::path& directory);
+
+}  // namespace tribin::sim

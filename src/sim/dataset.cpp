@@ -1,0 +1,175 @@
+#include "tribin/sim/dataset.hpp"
+
+#include <algorithm>
+#include <cstdio>
+#include <exception>
+#include <fstream>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "io/atomic_file.hpp"
+#include "sim/drawn_scene.hpp"
+#include "sim/random.hpp"
+#include "tribin/core/error.hpp"
+#include "tribin/core/parallel.hpp"
+#include "tribin/sim/bop_writer.hpp"
+
+namespace tribin::sim {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::ordered_json;
+
+constexpr const char* kKinds[] = {"table", "bin"};
+
+void check(const DatasetOptions& options) {
+  if (options.parts.empty())
+    throw Error(ErrorCode::bad_option, "simulate: no part given; wanted --part CAD at least once");
+  if (options.scenes < 1)
+    throw Error(ErrorCode::bad_option,
+                "simulate: --scenes is " + std::to_string(options.scenes) + "; wanted 1 or more");
+  std::set<std::string> names;
+  for (const Mesh& part : options.parts)
+    if (!names.insert(part.name).second)
+      throw Error(ErrorCode::bad_option, "simulate: two parts are called " + part.name);
+}
+
+std::string scene_name(int scene) {
+  char name[16];
+  std::snprintf(name, sizeof name, "%06d", scene);
+  return name;
+}
+
+ordered_json read_json(const fs::path& path) {
+  std::ifstream file(path);
+  ordered_json json = ordered_json::parse(file, nullptr, /*allow_exceptions=*/false);
+  if (json.is_discarded())
+    throw Error(ErrorCode::bad_input, path.string() + ": cannot be read as JSON; remove the scene to make it anew");
+  return json;
+}
+
+/// What makes two data sets the same: the parts by their triangles, and all that is drawn from.
+ordered_json recipe_of(const DatasetOptions& options) {
+  ordered_json parts = ordered_json::array();
+  for (const Mesh& part : options.parts) {
+    std::uint64_t hash = part.triangles.size();
+    for (const Vec3f& v : part.vertices)
+      for (int k = 0; k < 3; ++k) hash = mixed(hash ^ std::bit_cast<std::uint32_t>(v[k]));
+    parts.push_back({{"name", part.name}, {"hash", hash}});
+  }
+  return {{"kind", kKinds[static_cast<int>(options.kind)]},
+          {"level", settings_of(options.level).name},
+          {"seed", options.seed},
+          {"version", TRIBIN_VERSION},
+          {"parts", parts}};
+}
+
+/// Goes on with a data set of the same recipe, or starts one.
+void open_dataset(const DatasetOptions& options, const fs::path& directory) {
+  const ordered_json recipe = recipe_of(options);
+  const fs::path file = directory / "dataset.json";
+  if (fs::exists(file)) {
+    if (read_json(file) != recipe)
+      throw Error(ErrorCode::bad_option, directory.string() +
+                                             " holds a data set of other parts, kind, level, seed or version; wanted "
+                                             "the same, an empty folder or a new one");
+    return;
+  }
+  if (fs::exists(directory / "test"))
+    throw Error(ErrorCode::bad_option,
+                directory.string() + " holds scenes without their dataset.json; wanted an empty folder or a new one");
+  write_bop_models(directory, options.parts, StructuredLight().camera, depth_scale_for(1500));
+  io::write_file(file, recipe.dump(1) + "\n");
+}
+
+/// Makes one scene and puts it in its place.
+void make_scene(const DatasetOptions& options, const SceneStock& stock, int scene, const fs::path& directory) {
+  const LevelSettings& level = settings_of(options.level);
+  const std::uint64_t seed = mixed(options.seed * 1000003u + static_cast<std::uint64_t>(scene));
+  const DrawnScene drawn =
+      options.kind == SceneKind::table ? draw_table_scene(stock, level, seed) : draw_bin_scene(stock, level, seed);
+  const SimulatedScan simulated = simulate_scan(drawn.bodies, drawn.sensor, seed);
+  const auto objects = std::count_if(drawn.object_of_body.begin(), drawn.object_of_body.end(), [](int k) { return k; });
+  ordered_json info = {{"kind", kKinds[static_cast<int>(options.kind)]},
+                       {"level", level.name},
+                       {"seed", options.seed},
+                       {"objects", objects},
+                       {"sigma_i", drawn.sensor.image_noise},
+                       {"noise_correlation_px", drawn.sensor.noise_correlation_px},
+                       {"systematic", drawn.sensor.systematic},
+                       {"mirror_share", drawn.sensor.mirror_share},
+                       {"lost", drawn.sensor.lost_share}};
+  info.update(drawn.info);
+  info["valid"] = static_cast<double>(valid_count(simulated.scan)) / simulated.scan.z_mm.size();
+
+  const fs::path unfinished = unfinished_scenes(directory) / scene_name(scene);
+  fs::remove_all(unfinished);
+  write_bop_scene(unfinished, {&simulated, drawn.camera_from_world, drawn.object_of_body},
+                  static_cast<int>(options.parts.size()), depth_scale_for(drawn.largest_depth_mm));
+  io::write_file(unfinished / "scene_info.json", info.dump(1) + "\n");
+  fs::rename(unfinished, directory / "test" / scene_name(scene));
+}
+
+/// The lists of a data set, from what its scenes say themselves.
+void write_lists(const DatasetOptions& options, const fs::path& directory) {
+  ordered_json infos, targets = ordered_json::array();
+  for (int scene = 1; scene <= options.scenes; ++scene) {
+    const fs::path folder = directory / "test" / scene_name(scene);
+    infos[std::to_string(scene)] = read_json(folder / "scene_info.json");
+    std::vector<int> counts(options.parts.size() + 1, 0);
+    const ordered_json truth = read_json(folder / "scene_gt.json");
+    for (const ordered_json& instance : truth.at("0")) ++counts.at(instance.at("obj_id").get<std::size_t>());
+    for (std::size_t k = 1; k < counts.size(); ++k)
+      if (counts[k] > 0)
+        targets.push_back({{"im_id", 0}, {"inst_count", counts[k]}, {"obj_id", k}, {"scene_id", scene}});
+  }
+  io::write_file(directory / "scene_info.json", infos.dump(1) + "\n");
+  io::write_file(directory / "test_targets_bop19.json", targets.dump(1) + "\n");
+}
+
+}  // namespace
+
+SceneKind scene_kind_of(const std::string& name) {
+  if (name == kKinds[0]) return SceneKind::table;
+  if (name == kKinds[1]) return SceneKind::bin;
+  throw Error(ErrorCode::bad_option, "--kind is \"" + name + "\"; wanted table or bin");
+}
+
+fs::path unfinished_scenes(const fs::path& directory) { return directory / ".unfinished"; }
+
+void simulate_dataset(const DatasetOptions& options, const fs::path& directory) {
+  check(options);
+  open_dataset(options, directory);
+  std::vector<int> missing;
+  for (int scene = 1; scene <= options.scenes; ++scene)
+    if (!fs::exists(directory / "test" / scene_name(scene))) missing.push_back(scene);
+  if (!missing.empty()) {
+    const SceneStock stock = make_stock(options.parts, options.kind, settings_of(options.level));
+    fs::create_directories(directory / "test");
+    std::mutex mutex;
+    int done = options.scenes - static_cast<int>(missing.size());
+    std::exception_ptr failure;
+    parallel_each(static_cast<int>(missing.size()), [&](int i) {
+      {
+        const std::lock_guard lock(mutex);
+        if (failure) return;  // the others stay as they are: the next run goes on
+      }
+      try {
+        make_scene(options, stock, missing[i], directory);
+      } catch (...) {
+        const std::lock_guard lock(mutex);
+        if (!failure) failure = std::current_exception();
+        return;
+      }
+      const std::lock_guard lock(mutex);
+      ++done;
+      if (options.progress) options.progress(done, options.scenes);
+    });
+    fs::remove_all(unfinished_scenes(directory));
+    if (failure) std::rethrow_exception(failure);
+  }
+  write_lists(options, directory);
+}
+
+}  // namespace tribin::sim

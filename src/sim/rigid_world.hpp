@@ -1,0 +1,31 @@
+#pragma once
+
+#include <memory>
+
+#include "tribin/sim/bin_scene.hpp"
+
+namespace tribin::sim {
+
+/// Rigid bodies between the walls of a bin. Bullet stays behind this class.
+class RigidWorld {
+ public:
+  /// Walls without end stand on the floor z = 0 at x = +-length / 2, y = +-width / 2.
+  RigidWorld(double length_mm, double width_mm);
+  ~RigidWorld();
+  RigidWorld(const RigidWorld&) = delete;
+  RigidWorld& operator=(const RigidWorld&) = delete;
+
+  void add(const Solid& solid, const Pose& world_from_part, const Vec3& velocity_mm_s);
+  void step();  ///< 1/240 s
+  /// Share of its speed that a body loses in a second; 0 by default.
+  void set_damping(double share);
+  int size() const;
+  Pose world_from_part(int body) const;
+  double top_mm(int body) const;      ///< upper bound of its highest point
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace tribin::sim
