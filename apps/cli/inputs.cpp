@@ -50,7 +50,8 @@ std::vector<PartArgument> part_arguments(const std::vector<std::string>& argumen
 }
 
 void refuse_without_simulation() {
-  throw Error(ErrorCode::bad_option, "the simulated camera is not built in; install libembree-dev and build again");
+  throw Error(ErrorCode::bad_option,
+              "the simulated camera is not built in; install libembree-dev libbullet-dev and build again");
 }
 
 void add_any_scan(CLI::App* command, std::string& scan, std::string& camera, std::string& unit) {

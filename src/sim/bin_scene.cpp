@@ -13,14 +13,15 @@ namespace tribin::sim {
 namespace {
 
 constexpr int kStepsPerSecond = 240;
-constexpr int kStepsBetween = 24;          // a part every 0.1 s: the one before has fallen half its size
-constexpr double kDropSpeed = 600;         // mm/s at release: a fall of 18 mm
-constexpr int kQuietAfter = 120;           // steps after the last drop, when damping begins to end rolling and rocking
-constexpr int kLongest = 6 * 240;          // steps after the last drop, at most
-constexpr double kDamping = 0.9;           // share of speed lost in a second, then
-constexpr double kStrongDamping = 0.9999;  // and three times as late: what still rolls
-// At rest: no point of any part has moved by more than 0.3 mm within a quarter of a second.
+constexpr int kStepsBetween = 24;   // a part every 0.1 s: the one before has fallen half its size
+constexpr double kDropSpeed = 600;  // mm/s at release: a fall of 18 mm
+constexpr int kQuietAfter = 120;    // steps after the last drop, when damping begins to end rolling and rocking
+constexpr int kLongest = 6 * 240;   // steps after the last drop, at most
+constexpr double kDamping = 0.9;    // share of speed lost in a second, then
+// Whatever has moved by less than 0.3 mm within a quarter of a second stays as it lies, from 1 s after the last drop
+// on: dry friction holds parts that a solver lets creep.
 constexpr double kStill = 0.3;
+constexpr int kFreezeAfter = 240;
 constexpr int kWindow = 60;
 
 /// A rotation drawn evenly from all. \source Shoemake, Graphics Gems III, 1992.
@@ -112,22 +113,26 @@ BinFill fill_bin(const std::vector<const Solid*>& parts, double length_mm, doubl
     last = step;
   }
   std::vector<Pose> before(parts.size(), Pose::Identity());
-  double drift = 1e30;
-  for (; step < last + kLongest && drift > kStill; ++step) {
+  double drift = parts.empty() ? 0 : 1e30;
+  for (; step < last + kLongest && drift > 0; ++step) {
     if (step == last + kQuietAfter) world.set_damping(kDamping);
-    if (step == last + 3 * kQuietAfter) world.set_damping(kStrongDamping);
     world.step();
     if ((step - last) % kWindow != kWindow - 1) continue;
     drift = 0;
     for (int i = 0; i < world.size(); ++i) {
+      if (world.frozen(i)) continue;
       const Pose now = world.world_from_part(i);
-      drift = std::max(drift, largest_motion(*parts[i], before[i], now));
+      const double moved = largest_motion(*parts[i], before[i], now);
       before[i] = now;
+      if (moved < kStill && step > last + kFreezeAfter)
+        world.freeze(i);
+      else
+        drift = std::max(drift, moved);
     }
   }
 
   BinFill fill;
-  fill.drift_mm = parts.empty() ? 0 : drift;
+  fill.drift_mm = drift;
   fill.simulated_s = static_cast<double>(step) / kStepsPerSecond;
   for (int i = 0; i < world.size(); ++i) {
     fill.bin_from_part.push_back(world.world_from_part(i));

@@ -114,6 +114,17 @@ void RigidWorld::set_damping(double share) {
   for (State::Body& b : state_->bodies) b.body->setDamping(static_cast<float>(share), static_cast<float>(share));
 }
 
+void RigidWorld::freeze(int body) {
+  btRigidBody& b = *state_->bodies[body].body;
+  state_->world.removeRigidBody(&b);  // it comes back among the static ones, which do not meet each other
+  b.setLinearVelocity(btVector3(0, 0, 0));
+  b.setAngularVelocity(btVector3(0, 0, 0));
+  b.setMassProps(0, btVector3(0, 0, 0));
+  state_->world.addRigidBody(&b);
+}
+
+bool RigidWorld::frozen(int body) const { return state_->bodies[body].body->isStaticObject(); }
+
 int RigidWorld::size() const { return static_cast<int>(state_->bodies.size()); }
 
 Pose RigidWorld::world_from_part(int body) const {

@@ -19,9 +19,12 @@ class RigidWorld {
   void step();  ///< 1/240 s
   /// Share of its speed that a body loses in a second; 0 by default.
   void set_damping(double share);
+  /// From now on the body stays as it lies; others rest on it.
+  void freeze(int body);
+  bool frozen(int body) const;
   int size() const;
   Pose world_from_part(int body) const;
-  double top_mm(int body) const;      ///< upper bound of its highest point
+  double top_mm(int body) const;  ///< upper bound of its highest point
 
  private:
   struct State;

@@ -14,8 +14,9 @@ constexpr float kReachAtRest = 0.3f, kReach = 6;
 constexpr float kStep = 1.0f / 240;
 // Parts rest this far apart: what the rounding of edges by the distance field may hide.
 constexpr float kGap = 0.3f;
-constexpr float kFriction = 0.4f;     // dry metal on metal, metal on plastic
-constexpr float kRolling = 0.01f;     // lever of rolling friction [cm]: a finished round on a flat
+constexpr float kFriction = 0.4f;  // dry metal on metal, metal on plastic
+// Lever of rolling friction, of the smaller diameter: rounds of cast and machined parts are no ideal cylinders.
+constexpr float kRolling = 0.005f;
 constexpr std::size_t kPerSide = 8;   // contacts kept of each direction
 constexpr std::size_t kPerPlane = 4;  // and of each wall: a flat side stands on three
 constexpr int kDepthOfTree = 64;
@@ -216,6 +217,9 @@ void ShellAlgorithm::processCollision(const btCollisionObjectWrapper* first, con
   const std::vector<ShellContact> contacts = shell_contacts(*shape_a, world_a, *shape_b, world_b, reach, kept);
   const btTransform a_from_world = first->getWorldTransform().inverse(),
                     b_from_world = second->getWorldTransform().inverse();
+  const double smaller =
+      shape_b->solid() ? std::min(shape_a->solid()->diameter, shape_b->solid()->diameter) : shape_a->solid()->diameter;
+  const float rolling = kRolling * static_cast<float>(smaller) * kUnit;
   for (std::size_t i = 0; i < contacts.size(); ++i) {
     btPersistentManifold*& manifold = manifold_[i / MANIFOLD_CACHE_SIZE];
     if (!manifold) manifold = m_dispatcher->getNewManifold(first->getCollisionObject(), second->getCollisionObject());
@@ -227,8 +231,8 @@ void ShellAlgorithm::processCollision(const btCollisionObjectWrapper* first, con
     point.m_index0 = c.point;
     point.m_partId0 = c.side;
     point.m_combinedFriction = kFriction;
-    point.m_combinedRollingFriction = kRolling;
-    point.m_combinedSpinningFriction = kRolling;
+    point.m_combinedRollingFriction = rolling;
+    point.m_combinedSpinningFriction = rolling;
     point.m_combinedRestitution = 0;
     const auto known = std::find_if(kept.begin(), kept.end(),
                                     [&](const KeptContact& k) { return k.point == c.point && k.side == c.side; });

@@ -46,8 +46,8 @@ struct BinFill {
   std::vector<Pose> bin_from_part;  ///< of each part, in the order given
   double top_mm = 0;                ///< highest point of any part
   double wall_contact_mm = 0;       ///< highest point of any part within 2 mm of a wall: the rim must not be lower
-  double drift_mm = 0;              ///< how far a point has moved in the last 0.25 s, at most: 0.3 = at rest
-  double max_overlap_mm = 0;        ///< deepest that a part's surface lies in another part or in the bin
+  double drift_mm = 0;        ///< of points of parts that were still moving when time was out, in 0.25 s; 0 = none was
+  double max_overlap_mm = 0;  ///< deepest that a part's surface lies in another part or in the bin
   double simulated_s = 0;
 };
 
