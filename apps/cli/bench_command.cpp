@@ -109,6 +109,7 @@ int run(const Options& options, const Context& context) {
   if (options.peers) {
     constexpr int kScenes = 3;  // of each part: a peer takes seconds for one
     std::cout << compare_with_peers(parts, options.first, std::min(kScenes, options.poses));
+    std::cout << compare_decoding(parts[0], options.first);
     return 0;
   }
   std::vector<eval::Model> models;
@@ -162,7 +163,7 @@ void add_bench(CLI::App& app, Context& context) {
       ->type_name("M");
   command->add_option("--unit", options->unit, "Unit of CAD files that name none: mm, cm, m, inch")->type_name("U");
   command->add_option("--json", options->json, "Write every run as JSON; - is stdout")->type_name("OUT|-");
-  command->add_flag("--peers", options->peers, "Instead: normals and segmentation beside other libraries");
+  command->add_flag("--peers", options->peers, "Instead: normals, segmentation and decoding beside other libraries");
   command->add_flag("--no-times", options->no_times, "Leave the times out: same input, same bytes");
   command->callback([options, &context] { context.run = [options, &context] { return run(*options, context); }; });
 }

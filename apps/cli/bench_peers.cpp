@@ -5,13 +5,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <ctime>
 #include <filesystem>
-#include <fstream>
 #include <map>
-#include <nlohmann/json.hpp>
 
 #include "output.hpp"
+#include "peer_process.hpp"
 #include "tribin/core/parallel.hpp"
 #include "tribin/eval/eval.hpp"
 #include "tribin/segmentation/primitives.hpp"
@@ -115,21 +113,6 @@ Score score_normals(const sim::SimulatedScan& truth, const std::vector<float>& n
           std::sqrt(squares / static_cast<double>(std::max<std::size_t>(1, angles.size())))};
 }
 
-template <class T>
-void write_raw(const fs::path& path, const std::vector<T>& values) {
-  std::ofstream file(path, std::ios::binary);
-  file.write(reinterpret_cast<const char*>(values.data()), static_cast<std::streamsize>(values.size() * sizeof(T)));
-}
-
-template <class T>
-std::vector<T> read_raw(const fs::path& path, std::size_t count) {
-  std::vector<T> values(count);
-  std::ifstream file(path, std::ios::binary);
-  file.read(reinterpret_cast<char*>(values.data()), static_cast<std::streamsize>(count * sizeof(T)));
-  if (!file) values.clear();
-  return values;
-}
-
 /// The cloud of a task: all points for normals; those of the part with their true normals for segmentation.
 void write_cloud(const Scene& scene, Task task, const fs::path& path) {
   const sim::SimulatedScan& s = scene.paper.simulated;
@@ -143,24 +126,6 @@ void write_cloud(const Scene& scene, Task task, const fs::path& path) {
     }
   write_raw(path, values);
 }
-
-/// Runs a peer on a cloud. \return its milliseconds, negative when it failed.
-double run_peer(const fs::path& program, const fs::path& cloud, const fs::path& out, const PinholeCamera& camera) {
-  std::string command;
-  for (const fs::path& word : {program, cloud, out}) command += "'" + word.string() + "' ";
-  command += std::to_string(camera.width) + " " + std::to_string(camera.height);
-  for (const double x : {camera.fx, camera.fy, camera.cx, camera.cy}) command += " " + std::to_string(x);
-  std::FILE* pipe = popen(command.c_str(), "r");
-  if (pipe == nullptr) return -1;
-  char line[256] = {};
-  const bool answered = std::fgets(line, sizeof line, pipe) != nullptr;
-  if (pclose(pipe) != 0 || !answered) return -1;
-  const nlohmann::json answer = nlohmann::json::parse(line, nullptr, false);
-  return answer.is_object() ? answer.value("ms", -1.0) : -1;
-}
-
-/// CPU time of this process, as the peers tell theirs: fair on a busy machine.
-double cpu_ms() { return 1000.0 * static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
 Score ours(const Scene& scene, Task task) {
   const Scan& scan = scene.paper.scan();
@@ -243,7 +208,7 @@ std::string compare_with_peers(const std::vector<Part>& parts, int first_seed, i
   }
   const int threads = thread_count();
   set_thread_count(1);  // as the peers
-  const fs::path folder = fs::read_symlink("/proc/self/exe").parent_path() / "peers";
+  const fs::path folder = peer_folder();
   StagedOutput scratch(fs::temp_directory_path() / "tribin_peers");
   fs::create_directories(scratch.path());
   std::string out = "Peers: the same " + std::to_string(all.size()) +
@@ -268,9 +233,9 @@ std::string compare_with_peers(const std::vector<Part>& parts, int first_seed, i
       for (const Scene& scene : all) {
         const fs::path cloud = scratch.path() / "cloud", result = scratch.path() / "result";
         write_cloud(scene, task, cloud);
-        const double ms = run_peer(folder / peer.program, cloud, result, scene.paper.scan().camera);
-        if (ms < 0) break;
-        scores.push_back(of_peer(scene, task, ms, result));
+        const auto times = run_peer(folder / peer.program, cloud, result, scene.paper.scan().camera);
+        if (!times.count("ms")) break;
+        scores.push_back(of_peer(scene, task, times.at("ms"), result));
       }
       out += scores.size() == all.size() ? row(peer.name, task, mean(scores), our_ms)
                                          : std::string("  ") + peer.name + ": failed\n";

@@ -14,4 +14,8 @@ namespace tribin::cli {
 /// \param scenes  of each part.
 std::string compare_with_peers(const std::vector<Part>& parts, int first_seed, int scenes);
 
+/// Decoding of structured-light frames by ours and by OpenCV's GrayCodePattern, each with its own pattern set of the
+/// same simulated scene (a part on a table, no shadows): time of one thread, pixels told, wrong columns.
+std::string compare_decoding(const Part& part, int seed);
+
 }  // namespace tribin::cli

@@ -52,9 +52,8 @@ void write_values(const std::string& path, const std::vector<T>& values) {
 class Stopwatch {
  public:
   /// Writes the line that is wanted on stdout.
-  void report() const {
-    std::printf("{\"ms\": %.3f}\n", 1000.0 * static_cast<double>(std::clock() - start_) / CLOCKS_PER_SEC);
-  }
+  void report() const { std::printf("{\"ms\": %.3f}\n", ms()); }
+  double ms() const { return 1000.0 * static_cast<double>(std::clock() - start_) / CLOCKS_PER_SEC; }
 
  private:
   std::clock_t start_ = std::clock();
