@@ -258,9 +258,9 @@ double scatter_of_largest(const Labelling& l) {
 }  // namespace
 
 bool noise_shows(const Scene& scene) {
-  // Fifteen faces, as many as simple parts have, of 192 points each, the largest window of a surfel: with more points
-  // windows grow until they decide.
-  if (scene.surfels.size() > 15 * 192) return false;
+  // Twenty faces, as a part of medium size has, of 192 points each, the largest window of a surfel: with more points
+  // windows grow until they decide, and labelling all takes longer than some seconds.
+  if (scene.surfels.size() > 20 * 192) return false;
   std::vector<float> share;
   for (std::uint32_t i = 0; i < scene.surfels.size(); ++i)
     if (scene.surfels.area_mm2[i] > 0)
