@@ -4,9 +4,11 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "tribin/core/error.hpp"
 #include "tribin/core/parallel.hpp"
+#include "tribin/core/vector_levels.hpp"
 
 namespace tribin::capture_detail {
 namespace {
@@ -29,18 +31,40 @@ float median_step(const Image<float>& column) {
 /// Bilinear interpolation of four corners (row-wise), one of which may be NaN; NaN where more are, or where they are
 /// more than `spread` apart.
 float interpolate(std::array<float, 4> c, float a, float b, float spread) {
+  const auto blend = [&] { return (1 - b) * ((1 - a) * c[0] + a * c[1]) + b * ((1 - a) * c[2] + a * c[3]); };
+  if (std::isfinite(c[0] + c[1] + c[2] + c[3])) {  // nearly always all four, or none
+    const float low = std::min(std::min(c[0], c[1]), std::min(c[2], c[3])),
+                high = std::max(std::max(c[0], c[1]), std::max(c[2], c[3]));
+    return high - low > spread ? kNaN : blend();
+  }
   int missing = -1, count = 0;
   for (int i = 0; i < 4; ++i)
     if (!std::isfinite(c[static_cast<std::size_t>(i)])) missing = i, ++count;
   if (count > 1) return kNaN;
-  if (count == 1) {
-    // The corner opposite to i is 3 - i: the plane through three corners.
-    const auto at = [&](int i) { return c[static_cast<std::size_t>(i)]; };
-    c[static_cast<std::size_t>(missing)] = at(missing ^ 1) + at(missing ^ 2) - at(missing ^ 3);
-  }
+  // The corner opposite to i is 3 - i: the plane through three corners.
+  const auto at = [&](int i) { return c[static_cast<std::size_t>(i)]; };
+  c[static_cast<std::size_t>(missing)] = at(missing ^ 1) + at(missing ^ 2) - at(missing ^ 3);
   const auto [low, high] = std::minmax_element(c.begin(), c.end());
   if (*high - *low > spread) return kNaN;
-  return (1 - b) * ((1 - a) * c[0] + a * c[1]) + b * ((1 - a) * c[2] + a * c[3]);
+  return blend();
+}
+
+/// Where a camera sees the rays first + u * step, u = 0 .. n - 1 [px]; -1, -1 behind it. One vector loop.
+TRIBIN_VECTOR_LEVELS void place_row(const RigCamera& camera, const Vec3& first, const Vec3& step, int n,
+                                    double* __restrict out_u, double* __restrict out_v) {
+  const double k1 = camera.distortion[0], k2 = camera.distortion[1], p1 = camera.distortion[2],
+               p2 = camera.distortion[3], k3 = camera.distortion[4];
+  const double fx = camera.camera.fx, fy = camera.camera.fy, cx = camera.camera.cx, cy = camera.camera.cy;
+  const double x0 = first.x(), y0 = first.y(), z0 = first.z(), x1 = step.x(), y1 = step.y(), z1 = step.z();
+  for (int u = 0; u < n; ++u) {
+    const double z = z0 + u * z1, inverse = 1 / z, x = (x0 + u * x1) * inverse, y = (y0 + u * y1) * inverse;
+    const double r2 = x * x + y * y, radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3));
+    const double dx = x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x);
+    const double dy = y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y;
+    const double pu = fx * dx + cx, pv = fy * dy + cy;
+    out_u[u] = z > 0 ? pu : -1;
+    out_v[u] = z > 0 ? pv : -1;
+  }
 }
 
 /// The corners of a distorted camera's image on the view, [px] with principal point 0.
@@ -129,16 +153,19 @@ ViewImage resample(const Decoded& decoded, const RigCamera& camera, const IdealV
   for (const double d : camera.distortion) straight &= d == 0;
   out.noise_share = straight ? 1 : 4.0 / 9;  // mean of the sum of squared bilinear weights
   const PinholeCamera& c = camera.camera;
+  const PinholeCamera& pinhole = view.pinhole;
   parallel_ranges(h, 32, [&](int begin, int end) {
-    for (int v = begin; v < end; ++v)
+    std::vector<double> at_u(static_cast<std::size_t>(w)), at_v(at_u.size());
+    for (int v = begin; v < end; ++v) {
+      if (straight) {
+        std::iota(at_u.begin(), at_u.end(), 0.0);
+        std::fill(at_v.begin(), at_v.end(), v);
+      } else {
+        place_row(camera, view.camera_from_view * pinhole.ray(0, v), view.camera_from_view * Vec3(1 / pinhole.fx, 0, 0),
+                  w, at_u.data(), at_v.data());
+      }
       for (int u = 0; u < w; ++u) {
-        double x = u, y = v;
-        if (!straight) {
-          const Vec3 ray = view.camera_from_view * view.pinhole.ray(u, v);
-          if (ray.z() <= 0) continue;
-          const Vec2 seen = distorted(camera.distortion, {ray.x() / ray.z(), ray.y() / ray.z()});
-          x = c.fx * seen.x() + c.cx, y = c.fy * seen.y() + c.cy;
-        }
+        const double x = at_u[static_cast<std::size_t>(u)], y = at_v[static_cast<std::size_t>(u)];
         if (!(x >= 0 && y >= 0 && x <= c.width - 1 && y <= c.height - 1)) continue;
         const int u0 = std::min(static_cast<int>(x), c.width - 2), v0 = std::min(static_cast<int>(y), c.height - 2);
         const float a = static_cast<float>(x - u0), b = static_cast<float>(y - v0);
@@ -167,6 +194,7 @@ ViewImage resample(const Decoded& decoded, const RigCamera& camera, const IdealV
         if (!out.row.empty())
           out.row(u, v) = straight ? decoded.row(u, v) : interpolate(corners_of(decoded.row), a, b, kAny);
       }
+    }
   });
   return out;
 }

@@ -59,31 +59,29 @@ struct Crossing {
   double row = 0;  ///< of the projector there [px]
 };
 
-Crossing cross(const RigCamera& projector, const Pose& projector_from_view, const Vec3& ray, double column) {
-  const Vec3 r = projector_from_view.linear() * ray, t = projector_from_view.translation();
+/// \param bent  whether the projector has distortion. \param r  the ray's direction, z = 1 in the view, in the
+/// projector's axes; \param t  the view's origin there.
+Crossing cross(const RigCamera& projector, bool bent, const Vec3& r, const Vec3& t, double column) {
   const PinholeCamera& c = projector.camera;
-  bool bent = false;
-  for (const double d : projector.distortion) bent |= d != 0;
+  const double wanted = (column - c.cx) / c.fx, enough = 1e-6 / c.fx;
+  double x = wanted, off = 0;
   Crossing out;
-  double row = c.cy;
-  // The column's plane, at the row where the ray meets it: with distortion that is a fixed point (contracts by the
-  // distortion's slope, so four rounds reach 1e-6 px).
-  for (int round = 0; round < (bent ? 5 : 1); ++round) {
-    double x = (column - c.cx) / c.fx;
-    if (bent) {
-      const std::optional<Vec2> ideal = undistorted(projector.distortion, {x, (row - c.cy) / c.fy});
-      if (!ideal) return {std::nan(""), 0, 0};
-      x = ideal->x();
-    }
+  // The plane of ideal points with this x meets the ray somewhere; there the lens puts x elsewhere than wanted, by the
+  // error of x and a little: each round leaves the distortion's slope of it, a tenth or less.
+  constexpr int kRounds = 12;
+  for (int round = 0; round < kRounds; ++round) {
     const double below = r.x() - x * r.z();
     out.z = (x * t.z() - t.x()) / below;
     out.slope = (t.z() + out.z * r.z()) / below / c.fx;
     const Vec3 p = r * out.z + t;
-    const Vec2 q = distorted(projector.distortion, {p.x() / p.z(), p.y() / p.z()});
-    row = c.fy * q.y() + c.cy;
+    const Vec2 ideal(p.x() / p.z(), p.y() / p.z());
+    const Vec2 seen = bent ? distorted(projector.distortion, ideal) : ideal;
+    out.row = c.fy * seen.y() + c.cy;
+    off = bent ? wanted - seen.x() : 0;
+    if (std::abs(off) < enough) return out;
+    x += off;
   }
-  out.row = row;
-  return out;
+  return {std::nan(""), 0, 0};  // the model folds the image there
 }
 
 }  // namespace
@@ -101,13 +99,16 @@ Triangulated triangulate(const Rig& rig, const Decoded& decoded) {
   Scan& scan = out.scan;
   const Pose projector_from_view = rig.projector->rig_from_camera.inverse() * out.rig_from_scan;
   const double noise = decoded.column_noise * std::sqrt(seen.noise_share);
+  bool bent = false;
+  for (const double d : rig.projector->distortion) bent |= d != 0;
   Image<float> sigma(scan.width(), scan.height(), 0), off_row(scan.width(), scan.height(), kNaN);
   parallel_ranges(scan.height(), 32, [&](int begin, int end) {
     for (int v = begin; v < end; ++v)
       for (int u = 0; u < scan.width(); ++u) {
         const float column = seen.column(u, v);
         if (!std::isfinite(column)) continue;
-        const Crossing at = cross(*rig.projector, projector_from_view, view.pinhole.ray(u, v), column);
+        const Crossing at = cross(*rig.projector, bent, projector_from_view.linear() * view.pinhole.ray(u, v),
+                                  projector_from_view.translation(), column);
         if (!(at.z > 0) || !std::isfinite(at.z)) {
           lose(scan, u, v, Invalid::out_of_view);
           continue;
