@@ -22,38 +22,58 @@ struct Line {
   double column = std::numeric_limits<double>::quiet_NaN(), slope = 0, noise_share = 1;
 };
 
-/// The gaps of a row, by their lower end.
+/// The gaps of a row in cells of equal width by their lower end, so that a column is looked up in a few of them.
 struct Gaps {
-  std::vector<Gap> all;
-  float widest = 0;
+  std::vector<Gap> all, unsorted;
+  std::vector<int> begin;  ///< of each cell in `all`, and the end
+  std::vector<int> next;   ///< free place of each cell while they are filled
+  float first = 0, per_cell = 0, widest = 0;
 
   void fill(const float* row, int width, float jump) {
-    all.clear();
+    unsorted.clear();
     widest = 0;
+    float least = std::numeric_limits<float>::max(), most = std::numeric_limits<float>::lowest();
     for (int u = 0; u + 1 < width; ++u) {
       const float low = std::min(row[u], row[u + 1]), high = std::max(row[u], row[u + 1]);
       if (!(high - low <= jump)) continue;  // NaN too
-      all.push_back({low, high, u});
+      unsorted.push_back({low, high, u});
       widest = std::max(widest, high - low);
+      least = std::min(least, low), most = std::max(most, low);
     }
-    std::sort(all.begin(), all.end(),
-              [](const Gap& p, const Gap& q) { return p.low != q.low ? p.low < q.low : p.u < q.u; });
+    // Cells as wide as the widest gap: one that holds a column begins in the column's cell or in the one before. Not
+    // more cells than pixels.
+    first = unsorted.empty() ? 0 : least;
+    const float range = unsorted.empty() ? 0 : most - least, cell = std::max(widest, range / static_cast<float>(width));
+    per_cell = cell > 0 ? 1 / cell : 0;
+    begin.assign(static_cast<std::size_t>(range * per_cell) + 2, 0);
+    for (const Gap& g : unsorted) ++begin[cell_of(g.low) + 1];
+    for (std::size_t i = 1; i < begin.size(); ++i) begin[i] += begin[i - 1];
+    all.resize(unsorted.size());
+    next.assign(begin.begin(), begin.end());
+    for (const Gap& g : unsorted) all[static_cast<std::size_t>(next[cell_of(g.low)]++)] = g;
   }
 
   /// The pixel nearest to where the row has column x; -1 where it has it nowhere, or in places further apart than noise
   /// makes a column cross x several times.
   int single_place(float x) const {
-    auto gap = std::lower_bound(all.begin(), all.end(), x - widest, [](const Gap& g, float at) { return g.low < at; });
+    if (all.empty() || x < first) return -1;
+    const std::size_t cells = begin.size() - 1, to = std::min(static_cast<std::size_t>((x - first) * per_cell), cells);
+    // One cell more than needed on either side makes rounding harmless.
+    const std::size_t from = to < 2 ? 0 : to - 2, end = std::min(to + 2, cells);
+    if (from >= end) return -1;
     int least = std::numeric_limits<int>::max(), most = -1, count = 0;
     double sum = 0;
-    for (; gap != all.end() && gap->low <= x; ++gap) {
-      if (gap->high < x) continue;
-      least = std::min(least, gap->u), most = std::max(most, gap->u);
-      sum += gap->u + (gap->high > gap->low ? 0.5 : 0), ++count;
+    for (int i = begin[from]; i < begin[end]; ++i) {
+      const Gap& gap = all[static_cast<std::size_t>(i)];
+      if (gap.low > x || gap.high < x) continue;
+      least = std::min(least, gap.u), most = std::max(most, gap.u);
+      sum += gap.u + (gap.high > gap.low ? 0.5 : 0), ++count;
     }
     if (count == 0 || most - least > 2 * kHalf + 1) return -1;
     return static_cast<int>(std::lround(sum / count));
   }
+
+  std::size_t cell_of(float low) const { return static_cast<std::size_t>((low - first) * per_cell); }
 };
 
 /// The place of projector column x near pixel u of a row, by a line through the pixels of one surface about it.
