@@ -182,21 +182,25 @@ TEST(ReadPicture, SixteenBitsColoursAndRefusals) {
   EXPECT_THROW(read_picture(folder.path() / "none.png"), Error);
 }
 
+/// What a rig of two cameras makes of the pictures of a board.
+RigCalibration calibrated(const BoardRig& rig, const PictureOptions& options, unsigned seed) {
+  std::vector<BoardObserver> observers;
+  for (const RigCamera& device : rig.devices) {
+    BoardObserver o{device.name, device.camera.width, device.camera.height, false, {}};
+    for (const Pose& pose : rig.rig_from_board)
+      o.views.push_back(
+          find_board(test::board_picture(rig.board, device, pose, options, seed), rig.board).value_or(BoardSighting{}));
+    observers.push_back(std::move(o));
+  }
+  return calibrate_rig(rig.board, rig.ids, observers);
+}
+
 /// Pictures to parameters: the covariance holds with points as they are found, not only with drawn noise.
 TEST(FindBoard, CalibrationFromPicturesFindsTheTruth) {
   for (unsigned seed = 1; seed <= 3; ++seed) {
     SCOPED_TRACE(seed);
     const BoardRig rig = test::random_board_rig(seed, {.views = 9, .focal = 1.2, .width = 640, .height = 480});
-    std::vector<BoardObserver> observers;
-    for (const RigCamera& device : rig.devices) {
-      BoardObserver o{device.name, device.camera.width, device.camera.height, false, {}};
-      for (std::size_t v = 0; v < rig.rig_from_board.size(); ++v)
-        o.views.push_back(
-            find_board(test::board_picture(rig.board, device, rig.rig_from_board[v], {}, seed + 100), rig.board)
-                .value_or(BoardSighting{}));
-      observers.push_back(o);
-    }
-    const RigCalibration result = calibrate_rig(rig.board, rig.ids, observers);
+    const RigCalibration result = calibrated(rig, {}, seed + 100);
     EXPECT_LT(result.rms_px, 0.1);
     for (std::size_t d = 0; d < 2; ++d) {
       const ObserverCalibration& o = result.observers[d];
@@ -208,6 +212,35 @@ TEST(FindBoard, CalibrationFromPicturesFindsTheTruth) {
       const Vec3 off = o.camera.rig_from_camera.translation() - rig.devices[d].rig_from_camera.translation();
       for (int i = 0; i < 3; ++i) EXPECT_LE(std::abs(off[i]), 3.5 * std::sqrt(o.pose_covariance(i, i)));
     }
+  }
+}
+
+/// Boards of all kinds give the rig: focal lengths and the distance of the cameras to some thousandths.
+TEST(FindBoard, EveryKindOfBoardCalibrates) {
+  std::vector<Board> boards{{BoardKind::circles, 8, 6, 20}, {BoardKind::asymmetric_circles, 4, 11, 36}};
+#ifdef TRIBIN_HAS_ARUCO
+  boards.push_back({BoardKind::charuco, 8, 6, 24, 17, "5X5_100"});
+#endif
+  for (const Board& board : boards) {
+    SCOPED_TRACE(describe(board));
+    const BoardRig rig =
+        test::random_board_rig(11, {.board = board, .views = 10, .focal = 1.2, .width = 800, .height = 600});
+    PictureOptions options;
+#ifdef TRIBIN_HAS_ARUCO
+    if (board.kind == BoardKind::charuco)
+      options.markers = printed(board, 60, true), options.marker_scale = 60 / board.pitch_mm;
+#endif
+    const RigCalibration result = calibrated(rig, options, 11);
+    EXPECT_LT(result.rms_px, 0.15);
+    RecordProperty("rms_px_" + std::to_string(static_cast<int>(board.kind)), std::to_string(result.rms_px));
+    int used = 0;
+    for (const BoardView& v : result.views) used += v.used;
+    EXPECT_GE(used, 7);
+    for (std::size_t d = 0; d < 2; ++d)
+      EXPECT_NEAR(result.observers[d].camera.camera.fx / rig.devices[d].camera.fx, 1, 0.004);
+    EXPECT_NEAR(result.observers[1].camera.rig_from_camera.translation().norm() /
+                    rig.devices[1].rig_from_camera.translation().norm(),
+                1, 0.004);
   }
 }
 

@@ -49,18 +49,20 @@ inline double board_light(const Board& board, const PictureOptions& options, dou
     return (1 - b) * ((1 - a) * at(u0, v0) + a * at(u0 + 1, v0)) +
            b * ((1 - a) * at(u0, v0 + 1) + a * at(u0 + 1, v0 + 1));
   }
-  // Circles of a quarter pitch, on white.
+  // Dark circles, a fifth of the rows' distance in radius.
   const double row_step = board.kind == BoardKind::asymmetric_circles ? 0.5 : 1.0;
   const int r = std::clamp(static_cast<int>(std::lround(y / (p * row_step))), 0, board.rows - 1);
-  double nearest = 1e9;
+  double nearest = 1e9;  // [px] from a circle's edge, outside > 0
+  const double radius = 0.2 * p * row_step;
   for (int row = std::max(0, r - 1); row <= std::min(board.rows - 1, r + 1); ++row) {
     const double shift = board.kind == BoardKind::asymmetric_circles ? 0.5 * (row % 2) : 0.0;
     const int c = std::clamp(static_cast<int>(std::lround(x / p - shift)), 0, board.columns - 1);
-    nearest = std::min(nearest, std::hypot((x - (c + shift) * p) / per_px.x(), (y - row * row_step * p) / per_px.y()));
+    const double dx = x - (c + shift) * p, dy = y - row * row_step * p, d = std::hypot(dx, dy);
+    const double mm_a_px = d > 0 ? std::hypot(per_px.x() * dx, per_px.y() * dy) / d : per_px.x();
+    nearest = std::min(nearest, (d - radius) / mm_a_px);
   }
-  const double radius = 0.2 * p * row_step / std::sqrt(per_px.x() * per_px.y());
   if (x < -2 * p || y < -2 * p || x > (board.columns + 1) * p || y > (row_step * board.rows + 1) * p) return 0.3;
-  return 0.5 + 0.5 * blurred_step(nearest - radius, sd);
+  return 0.5 + 0.5 * blurred_step(nearest, sd);
 }
 
 /// The picture that a camera takes of a board, with its distortion, blur and noise. ChArUco's blur is that of the
