@@ -184,6 +184,8 @@ void add_calibration_arguments(CLI::App* command, CalibrationArguments& argument
   command->add_option("--dictionary", arguments.dictionary, "charuco: OpenCV's name, as 4X4_50")->type_name("NAME");
   command->add_option("-o", arguments.out, "rig.json to write")->required()->type_name("FILE");
   command->add_option("--json", arguments.json, "Result with errors of each view; - is stdout")->type_name("OUT");
+  command->add_option("--report", arguments.report, "Folder for a page with the pictures' points and residuals")
+      ->type_name("DIR");
 }
 
 Board board_of(const CalibrationArguments& arguments) {
@@ -210,6 +212,11 @@ int finish_calibration(const CalibrationArguments& arguments, const RigCalibrati
   write_rig(staged.path(), rig_of(report));
   staged.publish();
   if (!arguments.json.empty()) write_text(arguments.json, rig_calibration_json(report));
+  if (!arguments.report.empty()) {
+    StagedOutput folder(arguments.report);
+    write_rig_calibration_report(folder.path(), report);
+    folder.publish();
+  }
   if (arguments.json == "-" || context.quiet) return 0;
   std::size_t used = 0;
   for (const BoardView& v : report.result.views) used += v.used;

@@ -9,7 +9,7 @@ namespace tribin::cli {
 
 /// The options that calibrate camera, projector and rig share.
 struct CalibrationArguments {
-  std::string kind = "chessboard", size, dictionary = "4X4_50", out, json;
+  std::string kind = "chessboard", size, dictionary = "4X4_50", out, json, report;
   double pitch_mm = 0, marker_mm = 0;
 };
 

@@ -92,6 +92,7 @@ RigCalibration calibrate_rig(const Board& board, std::span<const std::string> id
       int used = 0;
       const std::vector<Vec2> off = residuals(bundle, s);
       for (std::size_t i = 0; i < off.size(); ++i) {
+        o.residuals.push_back({s.view, s.pixel[i], -off[i], view.used && s.used[i]});
         // Of a view that is left out, all points say how far off it is.
         if (view.used && !s.used[i]) {
           ++o.dropped_points;

@@ -84,8 +84,10 @@ class CalibrateBoards(unittest.TestCase):
             self.assertIn(word, out.stderr)
 
     def test_rig_by_numbers_in_the_names(self):
-        out = run("rig", f"left={WORK / 'left'}", f"right={WORK / 'right'}", "--json", "-")
+        out = run("rig", f"left={WORK / 'left'}", f"right={WORK / 'right'}", "--json", "-", "--report", WORK / "page")
         self.assertEqual(out.returncode, 0, out.stderr)
+        page = (WORK / "page/index.html").read_text()
+        self.assertEqual((page.count("<svg viewBox=\"0 0 640 480\""), page.count("left out</span>")), (2, 0))
         (WORK / "result.json").write_text(out.stdout)
         checked = subprocess.run([sys.executable, ROOT / "tools/validate_json", ROOT / "schema/calibration.schema.json",
                                   WORK / "result.json"], capture_output=True, text=True)
@@ -149,8 +151,9 @@ class CalibrateBoards(unittest.TestCase):
         for view in range(1, 11):
             save(WORK / f"moved/l/{view}.png", picture(view))
             save(WORK / f"moved/r/{view}.png", picture(view if view != 7 else 3, right=True))
-        out = run("rig", f"l={WORK / 'moved/l'}", f"r={WORK / 'moved/r'}", "--json", "-")
+        out = run("rig", f"l={WORK / 'moved/l'}", f"r={WORK / 'moved/r'}", "--json", "-", "--report", WORK / "page")
         self.assertEqual(out.returncode, 0, out.stderr)
+        self.assertEqual((WORK / "page/index.html").read_text().count("left out</span>"), 1)
         self.assertIn("View '7' does not fit the others", out.stderr)
         result = json.loads(out.stdout)
         self.assertEqual([v["id"] for v in result["views"] if not v["used"]], ["7"])

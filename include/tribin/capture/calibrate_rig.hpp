@@ -31,6 +31,14 @@ struct BoardCoverage {
   double nearest_mm = 0, farthest_mm = 0;    ///< of the boards' middles
 };
 
+/// Where a point was seen against where it should be.
+struct PointResidual {
+  int view = 0;
+  Vec2 pixel = Vec2::Zero();   ///< seen
+  Vec2 off_px = Vec2::Zero();  ///< seen minus predicted
+  bool used = true;            ///< false: left out, alone or with its view
+};
+
 struct ObserverCalibration {
   RigCamera camera;  ///< rig_from_camera is the identity for the first one
   IntrinsicsCovariance covariance = IntrinsicsCovariance::Zero();  ///< in the order of kIntrinsicNames
@@ -43,6 +51,7 @@ struct ObserverCalibration {
   std::array<double, 9>
       ray_sd_px{};  ///< sd of a pixel's ray in the middle of each ninth, by a rotation that fits where the boards were
   BoardCoverage coverage;
+  std::vector<PointResidual> residuals;  ///< of all points of all views
 };
 
 /// How a view agrees with the rest.

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -26,5 +27,9 @@ std::vector<Warning> rig_calibration_warnings(const RigCalibrationReport& report
 
 /// The result of `tribin calibrate camera`, `projector` and `rig` (schema/calibration.schema.json).
 std::string rig_calibration_json(const RigCalibrationReport& report);
+
+/// Writes index.html: each device's picture with the boards' points and their residuals, what is uncertain where, the
+/// views by their rms. One page, no network. \throws Error bad_option when the folder cannot be written.
+void write_rig_calibration_report(const std::filesystem::path& folder, const RigCalibrationReport& report);
 
 }  // namespace tribin
