@@ -7,6 +7,7 @@
 #include "io/atomic_file.hpp"
 #include "io/json_fields.hpp"
 #include "io/png.hpp"
+#include "tribin/core/error.hpp"
 #include "tribin/core/parallel.hpp"
 
 namespace tribin {
@@ -97,6 +98,24 @@ FrameStack read_stack(const std::filesystem::path& folder, const std::string& ca
   return out;
 }
 
+void make_folder(const std::filesystem::path& folder) {
+  std::error_code failed;
+  std::filesystem::create_directories(folder, failed);
+  if (failed) bad_file(folder.string(), "folder", failed.message(), "a folder that can be written");
+}
+
+/// A pattern's entry in frames.json.
+nlohmann::ordered_json entry_json(const Pattern& p, const std::string& file) {
+  nlohmann::ordered_json entry{{"file", file}, {"kind", name_of(p.kind)}};
+  if (p.kind != PatternKind::white && p.kind != PatternKind::black) {
+    entry["axis"] = name_of(p.axis);
+    entry["period_px"] = p.period_px;
+  }
+  if (p.kind == PatternKind::phase) entry["shift_deg"] = p.shift_rad / kDegree;
+  if (p.bit >= 0) entry["bit"] = p.bit;
+  return entry;
+}
+
 }  // namespace
 
 std::vector<FrameStack> read_frames(const std::filesystem::path& folder, const std::filesystem::path& frames_file) {
@@ -127,28 +146,34 @@ std::vector<FrameStack> read_frames(const std::filesystem::path& folder, const s
 
 void write_patterns(const std::filesystem::path& folder, const std::vector<Pattern>& patterns, int width, int height,
                     double gamma, const std::vector<std::string>& cameras) {
-  std::error_code failed;
-  std::filesystem::create_directories(folder, failed);
-  if (failed) bad_file(folder.string(), "folder", failed.message(), "a folder that can be written");
+  make_folder(folder);
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
   for (std::size_t i = 0; i < patterns.size(); ++i) {
-    const Pattern& p = patterns[i];
     const std::string name = pattern_file_name(patterns, i);
-    io::write_file(folder / name, io::encode_png8(draw_pattern(p, width, height, gamma)));
-    nlohmann::ordered_json entry{{"file", name}, {"kind", name_of(p.kind)}};
-    if (p.kind != PatternKind::white && p.kind != PatternKind::black) {
-      entry["axis"] = name_of(p.axis);
-      entry["period_px"] = p.period_px;
-    }
-    if (p.kind == PatternKind::phase) entry["shift_deg"] = p.shift_rad / kDegree;
-    if (p.bit >= 0) entry["bit"] = p.bit;
-    list.push_back(entry);
+    io::write_file(folder / name, io::encode_png8(draw_pattern(patterns[i], width, height, gamma)));
+    list.push_back(entry_json(patterns[i], name));
   }
   nlohmann::ordered_json out;
   out["projector"] = {{"width", width}, {"height", height}};
   out["cameras"] = nlohmann::ordered_json::array();
   for (const std::string& camera : cameras)
     out["cameras"].push_back(nlohmann::ordered_json{{"camera", camera}, {"patterns", list}});
+  io::write_file(folder / "frames.json", out.dump(1) + "\n");
+}
+
+void write_frames(const std::filesystem::path& folder, const FrameStack& frames) {
+  TRIBIN_ASSERT(frames.files.size() == frames.patterns.size() && frames.grey16.size() <= frames.patterns.size());
+  make_folder(folder);
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  for (std::size_t i = 0; i < frames.patterns.size(); ++i) {
+    io::write_file(folder / frames.files[i],
+                   frames.grey8.empty() ? io::encode_png16(frames.grey16.at(i)) : io::encode_png8(frames.grey8.at(i)));
+    list.push_back(entry_json(frames.patterns[i], frames.files[i]));
+  }
+  nlohmann::ordered_json out;
+  if (frames.projector_width > 0)
+    out["projector"] = {{"width", frames.projector_width}, {"height", frames.projector_height}};
+  out["cameras"] = {nlohmann::ordered_json{{"camera", frames.camera}, {"patterns", list}}};
   io::write_file(folder / "frames.json", out.dump(1) + "\n");
 }
 

@@ -9,6 +9,7 @@
 #include "sim/noise_field.hpp"
 #include "sim/random.hpp"
 #include "sim/ray_scene.hpp"
+#include "sim/surface_light.hpp"
 #include "tribin/core/error.hpp"
 #include "tribin/core/parallel.hpp"
 
@@ -18,54 +19,20 @@ namespace {
 constexpr int kRows = 32;
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
-void check(const StructuredLight& s) {
-  const auto want = [](bool good, const char* what) {
-    if (!good) throw Error(ErrorCode::out_of_range, std::string("simulated sensor: wanted ") + what);
-  };
-  want(s.camera.width > 0 && s.camera.height > 0 && s.camera.fx > 0 && s.camera.fy > 0,
-       "a camera with width, height, fx, fy > 0");
-  want(s.baseline_mm > 0 && s.projector_focal_px > 0 && s.fringe_period_px > 0,
-       "baseline_mm, projector_focal_px, fringe_period_px > 0");
-  want(s.steps >= 3, "steps >= 3");
-  want(s.image_noise >= 0 && s.noise_mm >= 0, "image_noise and noise_mm >= 0");
-  want(s.noise_correlation_px >= 0 && s.noise_correlation_px <= 5, "noise_correlation_px in [0, 5]");
-  want(s.mirror_share >= 0 && s.mirror_share <= 1, "mirror_share in [0, 1]");
-  want(s.lost_share >= 0 && s.lost_share < 1, "lost_share in [0, 1)");
-  want(s.facing_modulation > 0 && s.reference_mm > 0, "facing_modulation and reference_mm > 0");
-}
-
 /// The light that comes back from one point.
 struct Return {
   double modulation = 0;  ///< grey levels
   Invalid state = Invalid::nothing_there;
 };
 
-/// sd of z for a facing surface of albedo 0.5 at the reference distance, by the noise law.
-double facing_sigma(const StructuredLight& s) {
-  if (s.noise_mm > 0) return s.noise_mm;
-  return s.reference_mm * s.reference_mm / (s.baseline_mm * s.projector_focal_px) * s.fringe_period_px / (2 * kPi) *
-         std::sqrt(2.0 / s.steps) * s.image_noise / s.facing_modulation;
-}
-
-/// \param e  unit, from the point to who looks at it.
-Return light_of(const RayScene& scene, const StructuredLight& s, const Vec3& point, const Vec3& normal, const Vec3& e,
+/// \param eye  unit, from the point to who looks at it.
+Return light_of(const RayScene& scene, const StructuredLight& s, const Vec3& point, const Vec3& normal, const Vec3& eye,
                 const Body& body) {
-  const Vec3 projector(s.baseline_mm, 0, 0), to_light = projector - point, l = to_light.normalized();
-  const double cos_light = normal.dot(l), cos_eye = normal.dot(e);
-  if (cos_light <= 0 || scene.occluded(point, projector)) return {0, Invalid::shadow};
-  // In units of a facing surface on the axis at the reference distance, which the projector meets slightly aslant.
-  const double reference = std::hypot(s.reference_mm, s.baseline_mm);
-  const double falloff = reference / to_light.norm();
-  const double modulation =
-      s.facing_modulation * (body.albedo / 0.5) * cos_light * (reference / s.reference_mm) * falloff * falloff;
-  if (std::min(cos_light, cos_eye) < std::cos(s.max_incidence)) return {modulation, Invalid::grazing};
-  // A lobe about the mirror direction, Blinn's with exponent 200 (machined metal: half width 6 deg), that fills the
-  // camera's range once it adds 1.5 times the diffuse light of a facing surface.
-  const double mirror = std::pow(std::max(0.0, normal.dot((l + e).normalized())), 200);
-  if (body.shine * s.highlight * mirror * falloff * falloff > 0.45 + 0.1 * (1 - cos_light))
-    return {modulation, Invalid::saturated};
-  if (modulation < s.min_modulation) return {modulation, Invalid::dark};
-  return {modulation, Invalid::measured};
+  const SurfaceLight light = light_at(scene, s, point, normal, eye, body);
+  if (!light.lit) return {0, Invalid::shadow};
+  if (std::min(light.cos_light, light.cos_eye) < std::cos(s.max_incidence)) return {light.diffuse, Invalid::grazing};
+  if (light.lobe > 0.45 + 0.1 * (1 - light.cos_light)) return {light.diffuse, Invalid::saturated};
+  return {light.diffuse, Invalid::measured};
 }
 
 Return light_of(const RayScene& scene, const StructuredLight& s, const Hit& hit, const Vec3& ray,
@@ -84,6 +51,22 @@ double upper_quantile(double share) {
   return low;
 }
 
+/// Whether a decoder reads a pixel of this modulation, or finds it dark, or a code bit uncertain: by chance, near the
+/// limits, as image noise falls.
+/// \source ours: a bit is uncertain within 2 sd of its threshold, the mean of white and black (so sd sqrt(1.5)), which
+/// a
+///         level lies one modulation from; 8 bits and complements tell 128 fringes apart.
+Invalid readable(const StructuredLight& s, double modulation, std::uint64_t seed, int u, int v) {
+  const double sd = s.image_noise;
+  if (modulation > 6 * std::max(sd, s.min_modulation / 3)) return Invalid::measured;
+  if (sd <= 0) return modulation < s.min_modulation ? Invalid::dark : Invalid::measured;
+  const auto below = [](double x) { return 0.5 * std::erfc(-x / std::sqrt(2.0)); };
+  Random random(mixed(seed ^ 0xDA2Cu) ^ (static_cast<std::uint64_t>(v) << 32 | static_cast<std::uint32_t>(u)));
+  if (random.uniform() < below((s.min_modulation - modulation) / (sd * std::sqrt(2.0 / s.steps)))) return Invalid::dark;
+  const double one_bit = below((2 * sd - modulation) / (sd * std::sqrt(1.5)));
+  return random.uniform() < 1 - std::pow(1 - one_bit, 8) ? Invalid::uncertain_bit : Invalid::measured;
+}
+
 /// One measured value: depth and modulation.
 struct Measured {
   double z = 0;
@@ -94,7 +77,6 @@ struct Measured {
 Measured mixed_pixel(const RayScene& scene, const StructuredLight& s, const std::vector<Body>& bodies, int u, int v,
                      const Hit& middle, const Return& middle_light) {
   // The pixel's square by four sub-samples and its middle.
-  constexpr std::array<std::array<double, 2>, 4> kOffsets = {{{-0.3, -0.3}, {0.3, -0.3}, {-0.3, 0.3}, {0.3, 0.3}}};
   const double scale = 2 * kPi / s.fringe_period_px;
   const Vec3 ray = s.camera.ray(u, v);
   // Column of the projector that lights depth z on a ray: f_p (x / z - B / z), with x / z from the ray.
@@ -108,7 +90,7 @@ Measured mixed_pixel(const RayScene& scene, const StructuredLight& s, const std:
       sum += light.modulation * std::polar(1.0, scale * (x - at));
   };
   if (middle.body >= 0) add(at, middle_light);
-  for (const auto& offset : kOffsets) {
+  for (const auto& offset : kSubSamples) {
     const Vec3 r = s.camera.ray(u + offset[0], v + offset[1]);
     const Hit hit = scene.first_hit(r);
     if (hit.body < 0) {
@@ -121,10 +103,6 @@ Measured mixed_pixel(const RayScene& scene, const StructuredLight& s, const std:
   Measured result{middle.t, middle_light};
   result.light.modulation = std::abs(sum) / count;
   if (result.light.state != Invalid::measured) return result;
-  if (result.light.modulation < s.min_modulation) {
-    result.light.state = Invalid::dark;
-    return result;
-  }
   const double x = at + std::arg(sum) / scale;
   result.z = s.baseline_mm / (ray.x() - x / s.projector_focal_px);
   return result;
@@ -135,7 +113,7 @@ Measured mixed_pixel(const RayScene& scene, const StructuredLight& s, const std:
 void add_mirrored(const RayScene& scene, const StructuredLight& s, const std::vector<Body>& bodies, const Vec3& ray,
                   const Hit& hit, Measured& m) {
   const double share = s.mirror_share * bodies[hit.body].shine;
-  if (share <= 0 || (m.light.state != Invalid::measured && m.light.state != Invalid::shadow)) return;
+  if (share <= 0 || m.light.state == Invalid::saturated) return;
   const Vec3 point = ray * hit.t, on = ray - 2 * ray.dot(hit.normal) * hit.normal;
   const Hit second = scene.next_hit(point, on);
   if (second.body < 0) return;
@@ -147,10 +125,8 @@ void add_mirrored(const RayScene& scene, const StructuredLight& s, const std::ve
   const double x_own = s.projector_focal_px * (ray.x() - s.baseline_mm / m.z),
                x_other = s.projector_focal_px * (q.x() - s.baseline_mm) / q.z();
   const std::complex<double> sum = own + other * std::polar(1.0, scale * (x_other - x_own));
-  if (std::abs(sum) < s.min_modulation) {
-    if (m.light.state == Invalid::measured) m.light = {std::abs(sum), Invalid::dark};
-    return;
-  }
+  // What is too weak to be read keeps its own reason.
+  if (std::abs(sum) < s.min_modulation && own == 0) return;
   const double base = own >= other ? x_own : x_other;
   const double x = base + std::arg(sum * std::polar(1.0, scale * (x_own - base))) / scale;
   const double z = s.baseline_mm / (ray.x() - x / s.projector_focal_px);
@@ -160,18 +136,6 @@ void add_mirrored(const RayScene& scene, const StructuredLight& s, const std::ve
     m.z = z;
   else
     m.light.state = Invalid::out_of_view;
-}
-
-/// Does the surface break between this pixel and a neighbour? `limit` [mm] on the second difference of z.
-bool on_edge(const SimulatedScan& out, int u, int v, double limit) {
-  const int body = out.body(u, v);
-  for (const auto [du, dv] : {std::array{1, 0}, std::array{0, 1}}) {
-    const int a = u - du, b = v - dv, c = u + du, d = v + dv;
-    if (!out.body.contains(a, b) || !out.body.contains(c, d)) continue;
-    if (out.body(a, b) != body || out.body(c, d) != body) return true;
-    if (body >= 0 && std::abs(out.true_z(a, b) - 2 * out.true_z(u, v) + out.true_z(c, d)) > limit) return true;
-  }
-  return false;
 }
 
 /// Silhouette of one body, were it alone.
@@ -219,8 +183,10 @@ void count_visible(SimulatedScan& out) {
 
 }  // namespace
 
-SimulatedScan simulate_scan(const std::vector<Body>& bodies, const StructuredLight& sensor, std::uint64_t seed) {
-  check(sensor);
+SimulatedScan simulate_scan(const std::vector<Body>& bodies, const StructuredLight& given, std::uint64_t seed) {
+  check_sensor(given);
+  StructuredLight sensor = given;
+  if (sensor.min_modulation == 0) sensor.min_modulation = 5 * sensor.image_noise * std::sqrt(2.0 / sensor.steps);
   for (const Body& body : bodies) TRIBIN_ASSERT(body.mesh != nullptr);
   const PinholeCamera& camera = sensor.camera;
   const int w = camera.width, h = camera.height;
@@ -253,7 +219,7 @@ SimulatedScan simulate_scan(const std::vector<Body>& bodies, const StructuredLig
       }
   });
 
-  const double sigma0 = facing_sigma(sensor);
+  const double sigma0 = facing_sigma(sensor), break_mm = edge_limit(sensor);
   const Image<float> noise = noise_field(w, h, sensor.noise_correlation_px, seed);
   // The systematic error: a quadratic over the image with coefficients in [-1, 1], scaled so that it stays below 1.
   Random random(mixed(seed) ^ 0x5E57E3A71Cu);
@@ -273,10 +239,10 @@ SimulatedScan simulate_scan(const std::vector<Body>& bodies, const StructuredLig
         if (hit.body < 0) continue;
         const Vec3 ray = camera.ray(u, v);
         Measured m{hit.t, light_of(scene, sensor, hit, ray, bodies)};
-        // A break is more than the noise shows: below it, mixing changes nothing that one could see.
-        if (sensor.mixed_pixels && on_edge(out, u, v, std::max(0.05, 2 * sigma0)))
+        if (sensor.mixed_pixels && on_edge(out.body, out.true_z, u, v, break_mm))
           m = mixed_pixel(scene, sensor, bodies, u, v, hit, m.light);
         if (sensor.mirror_share > 0) add_mirrored(scene, sensor, bodies, ray, hit, m);
+        if (m.light.state == Invalid::measured) m.light.state = readable(sensor, m.light.modulation, seed, u, v);
         if (!blots.empty() && blots(u, v) > lost_above) m.light.state = Invalid::lost;
         out.scan.invalid_reason(u, v) = static_cast<std::uint8_t>(m.light.state);
         if (m.light.state != Invalid::measured) continue;

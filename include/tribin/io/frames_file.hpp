@@ -25,4 +25,8 @@ std::vector<FrameStack> read_frames(const std::filesystem::path& folder, const s
 void write_patterns(const std::filesystem::path& folder, const std::vector<Pattern>& patterns, int width, int height,
                     double gamma = 1, const std::vector<std::string>& cameras = {"camera"});
 
+/// Writes what one camera took, under the stack's file names, and the frames.json that read_frames reads.
+/// \throws Error bad_input when the folder cannot be written.
+void write_frames(const std::filesystem::path& folder, const FrameStack& frames);
+
 }  // namespace tribin

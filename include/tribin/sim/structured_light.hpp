@@ -22,7 +22,8 @@ struct StructuredLight {
   double noise_correlation_px = 0.5;    ///< sd of the Gaussian that correlates the noise [px], in [0, 5]
   double facing_modulation = 70;        ///< grey levels for a facing surface of albedo 0.5 at reference_mm
   double reference_mm = 800;            ///< distance at which the projector's light is set
-  double min_modulation = 5;            ///< below it a pixel is not measured
+  double min_modulation = 0;            ///< below it a pixel is not measured; 0 = as the decoder has it: 5 sd of the
+                                        ///< modulation that image noise alone makes
   double max_incidence = 75 * kDegree;  ///< to camera or projector; beyond it a pixel is not measured
   double highlight = 0.5;               ///< 0 none .. 1: strength of mirror highlights, which saturate
   double mirror_share = 0;              ///< share of the light that shiny bodies throw on as clean mirrors, once
