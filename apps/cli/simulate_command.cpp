@@ -17,6 +17,7 @@ struct Options {
   std::string kind = "table", level = "easy", out, unit = "mm";
   int scenes = 1;
   std::uint64_t seed = 1;
+  bool frames = false;
 };
 
 #ifdef TRIBIN_WITH_SIM
@@ -26,6 +27,7 @@ int run(const Options& options, const Context& context) {
   dataset.level = sim::level_of(options.level);
   dataset.scenes = options.scenes;
   dataset.seed = options.seed;
+  dataset.frames = options.frames;
   for (const PartArgument& part : part_arguments(options.parts)) {
     dataset.parts.push_back(read_cad(part.file, {.unit = length_unit_from_name(options.unit)}));
     dataset.parts.back().name = part.name;
@@ -62,6 +64,7 @@ void add_simulate(CLI::App& app, Context& context) {
       ->type_name("DIR");
   command->add_option("--scenes", options->scenes, "How many")->check(CLI::Range(1, 1000000))->type_name("N");
   command->add_option("--seed", options->seed, "The same seed gives the same scenes")->type_name("S");
+  command->add_flag("--frames", options->frames, "Also the camera's pictures of the patterns, with rig.json, for scan");
   command->add_option("--unit", options->unit, "Unit of CAD files that name none: mm, cm, m, inch")->type_name("U");
   command->callback([options, &context] { context.run = [options, &context] { return run(*options, context); }; });
 }

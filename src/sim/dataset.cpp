@@ -13,7 +13,10 @@
 #include "sim/random.hpp"
 #include "tribin/core/error.hpp"
 #include "tribin/core/parallel.hpp"
+#include "tribin/io/frames_file.hpp"
+#include "tribin/io/rig_file.hpp"
 #include "tribin/sim/bop_writer.hpp"
+#include "tribin/sim/render_frames.hpp"
 
 namespace tribin::sim {
 namespace {
@@ -61,6 +64,7 @@ ordered_json recipe_of(const DatasetOptions& options) {
   return {{"kind", kKinds[static_cast<int>(options.kind)]},
           {"level", settings_of(options.level).name},
           {"seed", options.seed},
+          {"frames", options.frames},
           {"version", TRIBIN_VERSION},
           {"parts", parts}};
 }
@@ -81,6 +85,20 @@ void open_dataset(const DatasetOptions& options, const fs::path& directory) {
                 directory.string() + " holds scenes without their dataset.json; wanted an empty folder or a new one");
   write_bop_models(directory, options.parts, StructuredLight().camera, depth_scale_for(1500));
   io::write_file(file, recipe.dump(1) + "\n");
+}
+
+/// The scene as a camera takes it, one diffuse bounce included.
+void write_frames_of(const DrawnScene& drawn, std::uint64_t seed, const fs::path& folder) {
+  RenderOptions render;
+  render.bounce_rays = 16;  // grain of 2 grey levels at most, and only where a bounce is strong; 10 s a scene
+  PatternOptions patterns;
+  patterns.width = render.projector_width;
+  patterns.height = render.projector_height;
+  patterns.period_px = drawn.sensor.fringe_period_px;
+  patterns.steps = drawn.sensor.steps;
+  render.patterns = make_patterns(patterns);
+  write_frames(folder, render_frames(drawn.bodies, drawn.sensor, render, seed));
+  write_rig(folder / "rig.json", rig_of(drawn.sensor, render));
 }
 
 /// Makes one scene and puts it in its place.
@@ -107,6 +125,7 @@ void make_scene(const DatasetOptions& options, const SceneStock& stock, int scen
   fs::remove_all(unfinished);
   write_bop_scene(unfinished, {&simulated, drawn.camera_from_world, drawn.object_of_body},
                   static_cast<int>(options.parts.size()), depth_scale_for(drawn.largest_depth_mm));
+  if (options.frames) write_frames_of(drawn, seed, unfinished / "frames");
   io::write_file(unfinished / "scene_info.json", info.dump(1) + "\n");
   fs::rename(unfinished, directory / "test" / scene_name(scene));
 }

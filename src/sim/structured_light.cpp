@@ -67,6 +67,15 @@ Invalid readable(const StructuredLight& s, double modulation, std::uint64_t seed
   return random.uniform() < 1 - std::pow(1 - one_bit, 8) ? Invalid::uncertain_bit : Invalid::measured;
 }
 
+/// A camera of 8 bit rounds its grey levels: white noise of sd 1 / sqrt(12) of them, whatever correlates the rest.
+void add_rounding(const StructuredLight& s, std::uint64_t seed, Image<float>& noise) {
+  if (s.noise_mm > 0 || s.image_noise <= 0) return;
+  const Image<float> white = noise_field(noise.width, noise.height, 0, mixed(seed ^ 0x8B17u));
+  const auto share = static_cast<float>(std::sqrt(1.0 / 12) / s.image_noise);
+  for (std::size_t i = 0; i < noise.size(); ++i)
+    noise.data[i] = (noise.data[i] + share * white.data[i]) / std::sqrt(1 + share * share);
+}
+
 /// One measured value: depth and modulation.
 struct Measured {
   double z = 0;
@@ -220,7 +229,8 @@ SimulatedScan simulate_scan(const std::vector<Body>& bodies, const StructuredLig
   });
 
   const double sigma0 = facing_sigma(sensor), break_mm = edge_limit(sensor);
-  const Image<float> noise = noise_field(w, h, sensor.noise_correlation_px, seed);
+  Image<float> noise = noise_field(w, h, sensor.noise_correlation_px, seed);
+  add_rounding(sensor, seed, noise);
   // The systematic error: a quadratic over the image with coefficients in [-1, 1], scaled so that it stays below 1.
   Random random(mixed(seed) ^ 0x5E57E3A71Cu);
   std::array<double, 6> c{};

@@ -26,8 +26,9 @@ void check_sensor(const StructuredLight& s) {
 
 double facing_sigma(const StructuredLight& s) {
   if (s.noise_mm > 0) return s.noise_mm;
+  const double grey = std::hypot(s.image_noise, std::sqrt(1.0 / 12));  // with the rounding of 8 bit
   return s.reference_mm * s.reference_mm / (s.baseline_mm * s.projector_focal_px) * s.fringe_period_px / (2 * kPi) *
-         std::sqrt(2.0 / s.steps) * s.image_noise / s.facing_modulation;
+         std::sqrt(2.0 / s.steps) * grey / s.facing_modulation;
 }
 
 double edge_limit(const StructuredLight& s) { return std::max(0.05, 2 * facing_sigma(s)); }

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <limits>
 
 #include "tribin/core/error.hpp"
 #include "tribin/core/parallel.hpp"
@@ -117,6 +118,50 @@ TEST(SimulateScan, LosesTheShareThatIsAsked) {
   sensor.lost_share = 0.2;
   const SimulatedScan s = simulate_scan({{&table, camera_above(800, 0, 0), 0.5, 0}}, sensor, 3);
   EXPECT_NEAR(1 - static_cast<double>(valid_count(s.scan)) / s.scan.z_mm.size(), 0.2, 0.03);
+}
+
+/// Depth at which a ray from the camera meets a triangle, or infinity. \source Moeller and Trumbore, 1997.
+double met(const Vec3& ray, const Vec3& a, const Vec3& b, const Vec3& c) {
+  const Vec3 e = b - a, f = c - a, p = ray.cross(f), q = (-a).cross(e);
+  const double det = e.dot(p), u = (-a).dot(p) / det, v = ray.dot(q) / det, t = f.dot(q) / det;
+  return u >= 0 && v >= 0 && u + v <= 1 && t > 0 ? t : std::numeric_limits<double>::infinity();
+}
+
+TEST(SimulateScan, VisibleFractionsAreThoseOfAnIndependentCount) {
+  const Mesh table = table_mesh(), box = box_mesh(60, 40, 30), bar = box_mesh(200, 15, 15);
+  StructuredLight sensor = small_sensor();
+  sensor.camera = {160, 128, 220, 220, 79.5, 63.5};
+  const Pose view = camera_above(800, 0.2, 1);
+  Pose above = Pose::Identity();
+  above.linear() = rotation_from_vector(Vec3(0.1, 0.2, 0.8));
+  above.translation() = Vec3(-40, -60, 60);
+  const std::vector<Body> bodies = {{&table, view, 0.3, 0}, {&box, view, 0.5, 0}, {&bar, Pose(view * above), 0.5, 0}};
+  const SimulatedScan s = simulate_scan(bodies, sensor, 1);
+  std::vector<int> alone(3, 0), seen(3, 0);
+  for (int v = 0; v < 128; ++v)
+    for (int u = 0; u < 160; ++u) {
+      const Vec3 ray = sensor.camera.ray(u, v);
+      double nearest = std::numeric_limits<double>::infinity();
+      int first = -1;
+      for (int b = 0; b < 3; ++b) {
+        double t = std::numeric_limits<double>::infinity();
+        const auto corner = [&](std::uint32_t i) {
+          return Vec3(bodies[b].camera_from_body * Vec3(bodies[b].mesh->vertices[i].cast<double>()));
+        };
+        for (const auto& k : bodies[b].mesh->triangles)
+          t = std::min(t, met(ray, corner(k[0]), corner(k[1]), corner(k[2])));
+        if (std::isfinite(t)) ++alone[b];
+        if (t < nearest) nearest = t, first = b;
+      }
+      if (first >= 0) ++seen[first];
+    }
+  for (int b = 1; b < 3; ++b) {
+    SCOPED_TRACE(b);
+    EXPECT_GT(seen[b], 100);
+    EXPECT_NEAR(s.bodies[b].visible_fraction(), static_cast<double>(seen[b]) / alone[b], 0.01);
+    EXPECT_NEAR(s.bodies[b].pixels_visible, seen[b], 2);  // float and double may differ on a rim
+  }
+  EXPECT_LT(seen[1], 0.95 * alone[1]) << "the bar hides some of the box";
 }
 
 TEST(SimulateScan, RefusesSensorsThatCannotBe) {

@@ -23,8 +23,9 @@ struct DatasetOptions {
   std::vector<Mesh> parts;  ///< with their names; object k + 1 of the data set is parts[k]
   SceneKind kind = SceneKind::table;
   Level level = Level::easy;
-  int scenes = 1;                                      ///< >= 1
-  std::uint64_t seed = 1;                              ///< scene i depends on parts, kind, level, seed and i alone
+  int scenes = 1;          ///< >= 1
+  std::uint64_t seed = 1;  ///< scene i depends on parts, kind, level, seed and i alone
+  bool frames = false;     ///< also frames/: the pictures of a Gray code set with frames.json and rig.json, for `scan`
   std::function<void(int done, int scenes)> progress;  ///< called after each scene, by one thread at a time, if set
 };
 
