@@ -69,7 +69,8 @@ struct SimulatedScan {
 /// angles, fringes of other surfaces seen in shiny ones, a smooth systematic error. The same bytes for any number of
 /// threads. \param bodies  in the camera frame; a table is a body too. \param seed    of noise and systematic error.
 /// \throws Error  out_of_range, naming the setting, when the sensor makes no sense.
-/// \source        noise law: sigma_z = z^2 / (B f_p) * period / (2 pi) * sqrt(2 / steps) * image_noise / modulation, image
+/// \source        noise law: sigma_z = z^2 / (B f_p) * period / (2 pi) * sqrt(2 / steps) * image_noise / modulation,
+/// image
 ///                noise with the rounding to 8 bit, sd 1 / sqrt(12), that is not correlated.
 SimulatedScan simulate_scan(const std::vector<Body>& bodies, const StructuredLight& sensor, std::uint64_t seed);
 
