@@ -33,23 +33,61 @@ def rotation(w):
     return np.eye(3) + np.sin(angle) * c + (1 - np.cos(angle)) * c @ c
 
 
-def picture(view, right=False, scale=1):
-    """The board of a view, supersampled by the picture that is warped: exact for a pinhole."""
+def pose(view):
+    """camera_from_board: its rotation and place."""
     random = np.random.default_rng(view)
     turn = rotation(np.array([0, 0, random.uniform(-.3, .3)])) @ rotation(np.array([*random.uniform(-.6, .6, 2), 0]))
-    place = np.array([*random.uniform(-60, 60, 2), random.uniform(420, 520)]) - turn @ np.array([80, 50, 0.0])
-    if right:
-        back = rotation(RIGHT[0]).T
-        turn, place = back @ turn, back @ (place - RIGHT[1])
-    v, u = np.mgrid[0:SIZE[1] * 3, 0:SIZE[0] * 3]
-    pixels = np.stack([(u - 1) / 3, (v - 1) / 3, np.ones(u.shape)], -1).reshape(-1, 3).T
-    on_board = np.linalg.inv(K @ np.column_stack([turn[:, 0], turn[:, 1], place])) @ pixels
-    x, y = on_board[0] / on_board[2] / PITCH, on_board[1] / on_board[2] / PITCH
+    return turn, np.array([*random.uniform(-60, 60, 2), random.uniform(420, 520)]) - turn @ np.array([80, 50, 0.0])
+
+
+def albedo(x, y):
+    """Of the board and the table behind it, at board coordinates in squares [grey levels under full light]."""
     dark = (np.floor(x) + np.floor(y)) % 2 == 0
     squares = (x > -1) & (y > -1) & (x < COLUMNS) & (y < ROWS)
     paper = (x > -2) & (y > -2) & (x < COLUMNS + 1) & (y < ROWS + 1)
-    grey = np.where(squares & dark, 40.0, np.where(paper, 200.0, 90.0)).reshape(SIZE[1], 3, SIZE[0], 3).mean((1, 3))
-    return (grey + random.normal(0, 1.5, grey.shape)).clip(0, 255) * scale
+    return np.where(squares & dark, 40.0, np.where(paper, 200.0, 90.0))
+
+
+def on_board(turn, place, supersampling):
+    """Where each pixel of the camera meets the board's plane [mm]."""
+    n = supersampling
+    v, u = np.mgrid[0:SIZE[1] * n, 0:SIZE[0] * n]
+    pixels = np.stack([(u - (n - 1) / 2) / n, (v - (n - 1) / 2) / n, np.ones(u.shape)], -1).reshape(-1, 3).T
+    p = np.linalg.inv(K @ np.column_stack([turn[:, 0], turn[:, 1], place])) @ pixels
+    return p[0] / p[2], p[1] / p[2]
+
+
+def mean_of(values, n):
+    return values.reshape(SIZE[1], n, SIZE[0], n).mean((1, 3))
+
+
+def picture(view, right=False, scale=1):
+    """The board of a view, nine samples a pixel."""
+    turn, place = pose(view)
+    if right:
+        back = rotation(RIGHT[0]).T
+        turn, place = back @ turn, back @ (place - RIGHT[1])
+    x, y = on_board(turn, place, 3)
+    grey = mean_of(albedo(x / PITCH, y / PITCH), 3)
+    return (grey + np.random.default_rng(view).normal(0, 1.5, grey.shape)).clip(0, 255) * scale
+
+
+def frames(view, patterns, folder):
+    """What the camera takes of the board under each pattern of a projector at RIGHT, whose lens is K."""
+    turn, place = pose(view)
+    x, y = on_board(turn, place, 2)
+    in_camera = np.outer(turn[:, 0], x) + np.outer(turn[:, 1], y) + place[:, None]
+    in_projector = rotation(RIGHT[0]).T @ (in_camera - RIGHT[1][:, None])
+    lit = K @ in_projector
+    u, v = np.rint(lit[0] / lit[2]).astype(int), np.rint(lit[1] / lit[2]).astype(int)
+    seen = (u >= 0) & (v >= 0) & (u < SIZE[0]) & (v < SIZE[1])
+    light = albedo(x / PITCH, y / PITCH)
+    random = np.random.default_rng(view)
+    for file in sorted(patterns.glob("*.png")):
+        shown = np.asarray(Image.open(file), dtype=float)[v.clip(0, SIZE[1] - 1), u.clip(0, SIZE[0] - 1)] / 255
+        grey = mean_of(light * (0.05 + 0.95 * np.where(seen, shown, 0)), 2)
+        save(folder / file.name, (grey + random.normal(0, 1.5, grey.shape)).clip(0, 255))
+    shutil.copy(patterns / "frames.json", folder)
 
 
 def save(path, grey):
@@ -158,6 +196,26 @@ class CalibrateBoards(unittest.TestCase):
         result = json.loads(out.stdout)
         self.assertEqual([v["id"] for v in result["views"] if not v["used"]], ["7"])
         self.assertLess(result["rms_px"], 0.1)
+
+    def test_projector_from_its_own_patterns_and_a_scan_with_it(self):
+        patterns = WORK / "patterns"
+        done = subprocess.run([TRIBIN, "patterns", "--size", "640x480", "--axes", "both", "--camera", "left", "-o", patterns],
+                              capture_output=True, text=True)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        for view in range(1, 7):
+            frames(view, patterns, WORK / f"stops/{view}")
+        out = run("projector", WORK / "stops", "--json", "-", out="projector.json")
+        self.assertEqual(out.returncode, 0, out.stderr)
+        camera, projector = json.loads(out.stdout)["devices"]
+        self.assertEqual((camera["name"], camera["projector"], projector["projector"]), ("left", False, True))
+        for name, i, truth in (("fx", 0, 800), ("cx", 2, 318), ("fy", 4, 802), ("cy", 5, 243)):
+            self.assertLess(abs(projector["K"][i] - truth), 5 * projector["sd"][name], name)
+        off = np.array(projector["rig_from_camera"]["translation_mm"]) - RIGHT[1]
+        self.assertLess(np.linalg.norm(off), 5 * projector["sigma_mm"])
+        scanned = subprocess.run([TRIBIN, "scan", WORK / "stops/1", "--calibration", WORK / "projector.json",
+                                  "-o", WORK / "board.ply"], capture_output=True, text=True)
+        self.assertEqual((scanned.returncode, scanned.stderr), (0, ""))
+        self.assertEqual(run("projector", WORK / "stops", "--projector-size", "x", out="p.json").returncode, 2)
 
     def test_projector_wants_frames(self):
         self.fails(run("projector", WORK / "left"), 3, "frames.json")
