@@ -107,41 +107,6 @@ LookUp look_up_early(const SceneDepth& scene, const Pose& camera_from_part, std:
   return out;
 }
 
-double point_cost(const SceneDepth& scene, const Pose& camera_from_part, std::span<const Vec3f> points,
-                  double slack_mm) {
-  const FastPose fast(camera_from_part);
-  double cost = 0;
-  int count = 0;
-  for (const Vec3f& point : points) {
-    const Vec3f q = fast.move(point);
-    const Pixel p = project(scene, q);
-    if (!p.inside || scene.near_break(p.u, p.v)) continue;
-    const double e = scene.z_mm(p.u, p.v) - q[2], sigma = scene.sigma_mm(p.u, p.v);
-    cost += std::min(8.0, 0.5 * e * e / (sigma * sigma + slack_mm * slack_mm));
-    ++count;
-  }
-  return count > 0 ? cost / count : 8.0;
-}
-
-Pose settle_depth(const SceneDepth& scene, const Pose& camera_from_part, std::span<const Vec3f> points,
-                  std::size_t count) {
-  const FastPose fast(camera_from_part);
-  std::vector<float> shifts;
-  for (std::size_t i = 0; i < std::min(count, points.size()); ++i) {
-    const Vec3f q = fast.move(points[i]);
-    const Pixel p = project(scene, q);
-    if (!p.inside) continue;
-    const float z = scene.z_mm(p.u, p.v);
-    if (z > 0) shifts.push_back(z - q[2]);
-  }
-  if (shifts.empty()) return camera_from_part;
-  const auto middle = shifts.begin() + static_cast<std::ptrdiff_t>(shifts.size() / 2);
-  std::nth_element(shifts.begin(), middle, shifts.end());
-  Pose pose = camera_from_part;
-  pose.translation() *= 1 + *middle / pose.translation().z();
-  return pose;
-}
-
 Pose refine_points(const SceneDepth& scene, const Pose& start, std::span<const Vec3f> points,
                    std::span<const Vec3f> normals, std::size_t count, const PointRefineOptions& options) {
   Pose pose = start;

@@ -18,45 +18,55 @@ struct Scored {
 
 bool better(const Scored& a, const Scored& b) { return a.score != b.score ? a.score > b.score : a.order < b.order; }
 
-/// The best of each neighbourhood, at most `most`.
-std::vector<Scored> best_apart(const Part& part, std::vector<Scored> all, std::size_t most, double distance,
-                               double angle) {
+/// The best poses, none like another, and at each place (a quarter of the diameter around) at most `most` of them: how
+/// many parts the scan holds must not decide how closely each is looked at.
+std::vector<Scored> best_apart(const Part& part, std::vector<Scored> all, int most, double distance, double angle) {
   std::sort(all.begin(), all.end(), better);
+  const double place = 0.25 * part.diameter_mm;
   std::vector<Scored> out;
+  std::vector<Vec3> centers;
   for (const Scored& s : all) {
-    if (out.size() >= most) break;
-    if (std::none_of(out.begin(), out.end(),
-                     [&](const Scored& o) { return close_poses(part, s.pose, o.pose, distance, angle); }))
-      out.push_back(s);
+    const Vec3 center = s.pose * part.box_center();
+    int here = 0;
+    bool like_another = false;
+    for (std::size_t i = 0; i < out.size() && !like_another && here < most; ++i) {
+      if ((centers[i] - center).squaredNorm() > place * place) continue;
+      ++here;
+      like_another = close_poses(part, s.pose, out[i].pose, distance, angle);
+    }
+    if (like_another || here >= most) continue;
+    out.push_back(s);
+    centers.push_back(center);
   }
   return out;
 }
 
+/// Least score of a look-up that is worth more: an eighth of the view supported, all else hidden or unmeasured.
+constexpr double kKeep = 0.05;
+
 double noise_tolerance(const SceneDepth& scene) { return 4 * scene.median_sigma_mm; }
 
-/// \param settle_from  poses from this one on have a guessed depth: they are moved along the line of sight first.
+/// \param settle  the poses are as coarse as point pairs: they are moved onto the scan first.
 std::vector<Scored> look_up_all(const SceneDepth& scene, const Part& part, const std::vector<Pose>& poses,
-                                std::size_t settle_from) {
+                                bool settle) {
   // Half a step of the enumeration at the part's rim: 15 deg / 2 at 0.3 diameters is 3.9 %, its mean over the
   // points 3.5 %.
   const double tolerance = std::max(0.035 * part.diameter_mm, noise_tolerance(scene));
   constexpr std::size_t kFirst = 24, kAll = 64;
-  constexpr double kHopeless = 0.1, kKeep = 0.3;
+  constexpr double kHopeless = -0.1;
   std::vector<Scored> out(poses.size());
   parallel_ranges(static_cast<int>(poses.size()), 512, [&](int begin, int end) {
     for (int i = begin; i < end; ++i) {
       const auto k = static_cast<std::size_t>(i);
       const PartView& view = view_of(part, poses[k]);
       Pose pose = poses[k];
-      if (k >= settle_from) {
-        // The middle of a region is off by what drop-outs eat of its rim: a tenth of the part is usual on shiny flanks.
+      if (settle) {
         PointRefineOptions o;
         o.iterations = 3;
         o.start_tolerance_mm = 0.12 * part.diameter_mm;
         o.end_tolerance_mm = 0.06 * part.diameter_mm;
         o.center = part.box_center();
         o.lever_mm = part.gyration_mm;
-        pose = settle_depth(scene, pose, view.points, kFirst);
         pose = refine_points(scene, pose, view.points, view.normals, 48, o);
       }
       out[k] = {pose, look_up_early(scene, pose, view.points, view.normals, kFirst, kAll, tolerance, kHopeless).score(),
@@ -156,21 +166,17 @@ Refinement refine_guarded(const Part& part, const SceneDepth& scene, const Pose&
 namespace {
 
 /// Hypotheses -> look-up -> settled -> rendered, each time fewer.
-/// \param most  that are settled; a seventh of them is rendered.
+/// \param coarse  as of look_up_all.
 std::vector<PoseCandidate> sift(const SceneDepth& scene, const Part& part, int part_index,
-                                const std::vector<Pose>& poses, std::size_t settle_from, std::size_t most,
-                                std::vector<Reason>& rejected) {
-  std::vector<Scored> coarse = look_up_all(scene, part, poses, settle_from);
+                                const std::vector<Pose>& poses, bool settle_first, std::vector<Reason>& rejected) {
+  constexpr int kSettledHere = 16, kRenderedHere = 4;  // at one place
+  std::vector<Scored> coarse = look_up_all(scene, part, poses, settle_first);
   if (poses.size() > coarse.size())
-    add_reason(rejected, {part.name, "hypothesis", "look_up", coarse.empty() ? 0.0 : 0.3, 0.3,
+    add_reason(rejected, {part.name, "hypothesis", "look_up", coarse.empty() ? 0.0 : kKeep, kKeep,
                           static_cast<int>(poses.size() - coarse.size())});
-  coarse = best_apart(part, std::move(coarse), most, 0.05 * part.diameter_mm, 14 * kDegree);
+  coarse = best_apart(part, std::move(coarse), kSettledHere, 0.05 * part.diameter_mm, 14 * kDegree);
   std::vector<Scored> settled = settle(scene, part, std::move(coarse));
-  settled = best_apart(part, std::move(settled), most / 7, 0.02 * part.diameter_mm, 6 * kDegree);
-  // Far behind the best of the whole scan is not worth a rendering.
-  std::erase_if(settled,
-                [best = settled.empty() ? 0 : settled[0].score](const Scored& x) { return x.score < 0.5 * best; });
-
+  settled = best_apart(part, std::move(settled), kRenderedHere, 0.02 * part.diameter_mm, 6 * kDegree);
   std::vector<PoseCandidate> out(settled.size());
   parallel_each(static_cast<int>(settled.size()), [&](int i) {
     const auto k = static_cast<std::size_t>(i);
@@ -178,8 +184,9 @@ std::vector<PoseCandidate> sift(const SceneDepth& scene, const Part& part, int p
     c.part = part_index;
     const int step = step_for(part, scene, settled[k].pose, 1000);
     const double start = std::max(0.012 * part.diameter_mm, noise_tolerance(scene));
-    c.camera_from_part =
-        refine_pose(part.render_mesh, scene, settled[k].pose, refine_options(part, step, 4, start)).camera_from_part;
+    RefineOptions options = refine_options(part, step, 4, start);
+    options.outlines = true;  // a flat part slides on its face without them
+    c.camera_from_part = refine_pose(part.render_mesh, scene, settled[k].pose, options).camera_from_part;
     c.verification = verify_pose(part.render_mesh, scene, c.camera_from_part,
                                  verification_options(part, step, 0.004 * part.diameter_mm));
   });
@@ -206,11 +213,10 @@ std::vector<PoseCandidate> find_candidates(const SceneFeatures& features, SceneD
     hypotheses_from_pairs(features, part, poses);
     hypotheses_from_cylinders(features, part, poses);
     hypotheses_from_planes(features, part, poses);
-    return sift(scene, part, part_index, poses, poses.size(), 160, rejected);
+    return sift(scene, part, part_index, poses, false, rejected);
   }
   hypotheses_from_point_pairs(features, part, poses);
-  // Without a primitive's word for it the right pose stands further down the list.
-  return sift(scene, part, part_index, poses, 0, 600, rejected);
+  return sift(scene, part, part_index, poses, true, rejected);
 }
 
 }  // namespace tribin

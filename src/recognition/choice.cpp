@@ -27,20 +27,17 @@ Pose turned(const Pose& pose, const ContinuousSymmetry& line, double angle) {
   return pose * turn;
 }
 
-/// Spins about the axes that the part is nearly round about: the likeliest over the whole turn. A search, because ICP
-/// slides past the small features that decide.
+/// Spins about the axes that the part is nearly round about: the best rendered poses over the whole turn. A search on
+/// the likelihood, because ICP slides past the small features that decide. (The view's points instead of renders rank
+/// the right spin behind the eighth in 15 % of the cases, renders in 2 %.)
 void add_spins(const SceneDepth& scene, const Part& part, const Pose& pose, std::vector<Pose>& out) {
   constexpr int kSpins = 120;  // 3 deg: a hole of 5 % of the diameter at its rim
-  constexpr std::size_t kBest = 8;
-  // Half a pixel of a view's raster (1 % of the diameter) on a slope of 45 deg.
-  const double slack = 0.005 * part.diameter_mm;
+  constexpr std::size_t kBest = 8, kMost = 12;
+  const int step = step_for(part, scene, pose, kPolishPixels);
   for (const ContinuousSymmetry& axis : part.nearly_round) {
-    std::vector<double> score(kSpins);
-    parallel_each(kSpins, [&](int k) {
-      const Pose spin = turned(pose, axis, 2 * kPi * k / kSpins);
-      const PartView& view = view_of(part, spin);
-      score[static_cast<std::size_t>(k)] = -point_cost(scene, spin, view.points, slack);
-    });
+    std::vector<std::pair<const Part*, Pose>> spins;
+    for (int k = 0; k < kSpins; ++k) spins.emplace_back(&part, turned(pose, axis, 2 * kPi * k / kSpins));
+    const std::vector<double> score = log_likelihoods(scene, spins, step);
     std::vector<int> maxima;
     for (int k = 1; k < kSpins; ++k) {
       const auto at = [&](int i) { return score[static_cast<std::size_t>((i + kSpins) % kSpins)]; };
@@ -49,8 +46,12 @@ void add_spins(const SceneDepth& scene, const Part& part, const Pose& pose, std:
     std::stable_sort(maxima.begin(), maxima.end(), [&](int a, int b) {
       return score[static_cast<std::size_t>(a)] > score[static_cast<std::size_t>(b)];
     });
-    if (maxima.size() > kBest) maxima.resize(kBest);
-    for (const int k : maxima) out.push_back(turned(pose, axis, 2 * kPi * k / kSpins));
+    // Where the scan hardly tells the spins apart, all of them are alternatives.
+    std::size_t keep = std::min(kBest, maxima.size());
+    while (keep < std::min(kMost, maxima.size()) &&
+           score[static_cast<std::size_t>(maxima[keep])] > score[static_cast<std::size_t>(maxima[0])] - kUndecided)
+      ++keep;
+    for (std::size_t i = 0; i < keep; ++i) out.push_back(turned(pose, axis, 2 * kPi * maxima[i] / kSpins));
   }
 }
 
@@ -215,7 +216,9 @@ PoseCandidate settled_on_scan(const SceneDepth& scene, const Part& part, const P
   return out;
 }
 
-Polished polish(const SceneDepth& scene, std::span<const Part> parts, const PoseCandidate& settled) {
+namespace {
+
+Polished polish_once(const SceneDepth& scene, std::span<const Part> parts, const PoseCandidate& settled) {
   const Part& part = parts[static_cast<std::size_t>(settled.part)];
   const double noise = 4 * scene.median_sigma_mm;
   const int few = step_for(part, scene, settled.camera_from_part, kCompareFew);
@@ -230,7 +233,9 @@ Polished polish(const SceneDepth& scene, std::span<const Part> parts, const Pose
     const auto k = static_cast<std::size_t>(i);
     if (k > 0) {
       const double start = std::max(0.012 * part.diameter_mm, noise);
-      poses[k] = refine_pose(part.render_mesh, scene, poses[k], refine_options(part, few, 3, start)).camera_from_part;
+      RefineOptions options = refine_options(part, few, 3, start);
+      options.outlines = true;
+      poses[k] = refine_guarded(part, scene, poses[k], options).camera_from_part;
     }
     checks[k] =
         verify_pose(part.render_mesh, scene, poses[k], verification_options(part, few, 0.004 * part.diameter_mm));
@@ -250,7 +255,7 @@ Polished polish(const SceneDepth& scene, std::span<const Part> parts, const Pose
         }))
       keep.push_back(k);
   }
-  if (keep.size() > 14) keep.resize(14);
+  if (keep.size() > 16) keep.resize(16);
   std::vector<Finalist> finalists;
   std::vector<std::pair<const Part*, Pose>> kept;
   for (const std::size_t k : keep) {
@@ -279,6 +284,7 @@ Polished polish(const SceneDepth& scene, std::span<const Part> parts, const Pose
   Polished out;
   out.candidate = settled;
   out.candidate.camera_from_part = finalists[0].pose;
+  if (finalists[0].information != Matrix6::Zero()) out.candidate.information = finalists[0].information;
   out.candidate.verification = verify_pose(part.render_mesh, scene, finalists[0].pose,
                                            verification_options(part, fine, 0.002 * part.diameter_mm));
   out.log_likelihood = finalists[0].log_likelihood;
@@ -289,7 +295,34 @@ Polished polish(const SceneDepth& scene, std::span<const Part> parts, const Pose
   return out;
 }
 
+}  // namespace
+
+Polished polish(const SceneDepth& scene, std::span<const Part> parts, const PoseCandidate& settled) {
+  const Part& part = parts[static_cast<std::size_t>(settled.part)];
+  Polished out = polish_once(scene, parts, settled);
+  // Upside down and turned: a pose that has changed is taken for others than the one it came from.
+  constexpr int kMore = 2;
+  PoseCandidate from = settled;
+  for (int i = 0; i < kMore; ++i) {
+    const auto same = [&](const Pose& pose) {
+      return close_poses(part, from.camera_from_part, pose, 0.02 * part.diameter_mm, 4 * kDegree);
+    };
+    if (same(out.candidate.camera_from_part) ||
+        std::any_of(out.others.begin(), out.others.end(), [&](const auto& other) { return same(other.first); }))
+      break;
+    from = out.candidate;
+    out = polish_once(scene, parts, from);
+  }
+  return out;
+}
+
 namespace {
+
+// A right pose explains all that it judges but mixed pixels, what the part differs from its CAD, and what the sensor's
+// errors exceed its noise. On simulated heaps right ones have support of 0.966 and more, free space up to 0.008,
+// contours of 0.81 and more; a consumer depth camera (mp6d) leaves 0.89, 0.013 and 0.70. Impostors on heaps: support
+// below 0.85, or contours below 0.75 on little of the part, which the score tells.
+constexpr double kSupport = 0.85, kFreeSpace = 0.04, kContour = 0.65;
 
 /// \param slack  share of its surface that the pose may have wrong.
 bool keeps_limits(const Part& part, const PoseCandidate& candidate, double slack, std::vector<Reason>& rejected) {
@@ -301,9 +334,9 @@ bool keeps_limits(const Part& part, const PoseCandidate& candidate, double slack
   // 40 supported pixels fix a pose no better than chance does; less is not a look at a part.
   if (fails("pixels", v.supported, 40, v.supported < 40)) return false;
   if (fails("visible_fraction", v.visible_fraction(), 0.2, v.visible_fraction() < 0.2)) return false;
-  if (fails("free_space", v.free_space(), 0.08 + slack, v.free_space() > 0.08 + slack)) return false;
-  if (fails("support", v.support(), 0.6 - slack, v.support() < 0.6 - slack)) return false;
-  if (fails("contour", v.contour(), 0.5 - slack, v.contour() < 0.5 - slack)) return false;
+  if (fails("free_space", v.free_space(), kFreeSpace + slack, v.free_space() > kFreeSpace + slack)) return false;
+  if (fails("support", v.support(), kSupport - slack, v.support() < kSupport - slack)) return false;
+  if (fails("contour", v.contour(), kContour - slack, v.contour() < kContour - slack)) return false;
   return true;
 }
 

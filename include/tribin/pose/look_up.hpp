@@ -21,7 +21,7 @@ struct LookUp {
   /// one little, since nothing speaks against it. \source ours; weights as the log-odds of algorithm notes section 8,
   /// rounded.
   double score() const {
-    return total == 0 ? -1.0 : (supported + 0.5 * unsure - 3.0 * violated - 0.3 * occluded - 0.1 * no_data) / total;
+    return total == 0 ? -1.0 : (supported + 0.5 * unsure - 3.0 * violated - 0.1 * occluded - 0.05 * no_data) / total;
   }
 };
 
@@ -36,16 +36,6 @@ LookUp look_up(const SceneDepth& scene, const Pose& camera_from_part, std::span<
 LookUp look_up_early(const SceneDepth& scene, const Pose& camera_from_part, std::span<const Vec3f> points,
                      std::span<const Vec3f> normals, std::size_t first, std::size_t count, double tolerance_mm,
                      double hopeless);
-
-/// Mean cost of the points at a pose that is settled: half the squared residual along the line of sight, in the local
-/// sigma and `slack_mm` together, bounded at 4 sigma in front as behind; unmeasured points and those beside depth
-/// breaks are left out. Only differences between poses of one part mean something.
-double point_cost(const SceneDepth& scene, const Pose& camera_from_part, std::span<const Vec3f> points,
-                  double slack_mm);
-
-/// Moves a pose along its line of sight so that the median point lies on the scan: for poses whose depth is a guess.
-Pose settle_depth(const SceneDepth& scene, const Pose& camera_from_part, std::span<const Vec3f> points,
-                  std::size_t count);
 
 struct PointRefineOptions {
   int iterations = 8;
