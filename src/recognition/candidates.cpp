@@ -169,14 +169,15 @@ namespace {
 /// \param coarse  as of look_up_all.
 std::vector<PoseCandidate> sift(const SceneDepth& scene, const Part& part, int part_index,
                                 const std::vector<Pose>& poses, bool settle_first, std::vector<Reason>& rejected) {
-  constexpr int kSettledHere = 16, kRenderedHere = 4;  // at one place
+  // At one place. Without a primitive's word for it the right pose stands further down the list.
+  const int settled_here = settle_first ? 48 : 16, rendered_here = settle_first ? 12 : 4;
   std::vector<Scored> coarse = look_up_all(scene, part, poses, settle_first);
   if (poses.size() > coarse.size())
     add_reason(rejected, {part.name, "hypothesis", "look_up", coarse.empty() ? 0.0 : kKeep, kKeep,
                           static_cast<int>(poses.size() - coarse.size())});
-  coarse = best_apart(part, std::move(coarse), kSettledHere, 0.05 * part.diameter_mm, 14 * kDegree);
+  coarse = best_apart(part, std::move(coarse), settled_here, 0.05 * part.diameter_mm, 14 * kDegree);
   std::vector<Scored> settled = settle(scene, part, std::move(coarse));
-  settled = best_apart(part, std::move(settled), kRenderedHere, 0.02 * part.diameter_mm, 6 * kDegree);
+  settled = best_apart(part, std::move(settled), rendered_here, 0.02 * part.diameter_mm, 6 * kDegree);
   std::vector<PoseCandidate> out(settled.size());
   parallel_each(static_cast<int>(settled.size()), [&](int i) {
     const auto k = static_cast<std::size_t>(i);

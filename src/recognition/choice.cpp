@@ -322,7 +322,7 @@ namespace {
 // errors exceed its noise. On simulated heaps right ones have support of 0.966 and more, free space up to 0.008,
 // contours of 0.81 and more; a consumer depth camera (mp6d) leaves 0.89, 0.013 and 0.70. Impostors on heaps: support
 // below 0.85, or contours below 0.75 on little of the part, which the score tells.
-constexpr double kSupport = 0.85, kFreeSpace = 0.04, kContour = 0.65;
+constexpr double kSupport = 0.85, kFreeSpace = 0.08, kContour = 0.65;
 
 /// \param slack  share of its surface that the pose may have wrong.
 bool keeps_limits(const Part& part, const PoseCandidate& candidate, double slack, std::vector<Reason>& rejected) {

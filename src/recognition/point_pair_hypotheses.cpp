@@ -10,7 +10,7 @@ namespace tribin {
 namespace {
 
 constexpr int kTurns = PointPairTable::kTurns;
-constexpr std::size_t kEvery = 5;  // one of so many points votes: a part that shows 40 % of itself has 20 of them
+constexpr std::size_t kEvery = 2;  // one of so many points votes: a part that shows 40 % of itself has some 50 of them
 constexpr int kPeaks = 4;          // of each voter: beside a flat face the right place is not always the first
 
 struct OrientedPoints {

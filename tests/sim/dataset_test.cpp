@@ -1,6 +1,7 @@
 #include "tribin/sim/dataset.hpp"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
@@ -37,7 +38,9 @@ class BinDataset : public testing::Test {
   void TearDown() override {
     for (const char* name : {"whole", "resumed"}) fs::remove_all(folder(name));
   }
-  static fs::path folder(const std::string& name) { return fs::path(testing::TempDir()) / ("tribin_bin_" + name); }
+  static fs::path folder(const std::string& name) {
+    return fs::path(testing::TempDir()) / ("tribin_bin_" + std::to_string(::getpid()) + name);
+  }
   DatasetOptions options_;
 };
 
