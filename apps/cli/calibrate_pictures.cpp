@@ -132,7 +132,7 @@ int calibrate([[maybe_unused]] const Options& options, [[maybe_unused]] const st
               [[maybe_unused]] const Context& context) {
 #ifdef TRIBIN_WITH_CALIBRATION
   RigCalibrationReport report = look(board_of(options), sources);
-  report.result = calibrate_rig(report.board, report.ids, report.observers);
+  report.result = calibrate_rig(report.board, report.observers);
   return finish_calibration(options, report, context);
 #else
   refuse_without_calibration();

@@ -119,7 +119,7 @@ RigCalibrationReport look(const Options& options) {
 int run([[maybe_unused]] const Options& options, [[maybe_unused]] const Context& context) {
 #ifdef TRIBIN_WITH_CALIBRATION
   RigCalibrationReport report = look(options);
-  report.result = calibrate_rig(report.board, report.ids, report.observers);
+  report.result = calibrate_rig(report.board, report.observers);
   return finish_calibration(options, report, context);
 #else
   refuse_without_calibration();

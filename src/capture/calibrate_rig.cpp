@@ -48,13 +48,13 @@ RigCamera camera_of(const Device& device, const BoardObserver& observer) {
 
 }  // namespace
 
-RigCalibration calibrate_rig(const Board& board, std::span<const std::string> ids,
-                             std::span<const BoardObserver> observers) {
+RigCalibration calibrate_rig(const Board& board, std::span<const BoardObserver> observers) {
   validate(board);
   TRIBIN_ASSERT(!observers.empty());
-  for (const BoardObserver& o : observers) TRIBIN_ASSERT(o.views.size() == ids.size() && o.width > 0 && o.height > 0);
+  const std::size_t views = observers[0].views.size();
+  for (const BoardObserver& o : observers) TRIBIN_ASSERT(o.views.size() == views && o.width > 0 && o.height > 0);
   std::vector<Bundle> alone;
-  for (const BoardObserver& o : observers) alone.push_back(calibrate_alone(board, o, ids.size()));
+  for (const BoardObserver& o : observers) alone.push_back(calibrate_alone(board, o));
   Bundle bundle = observers.size() == 1 ? alone[0] : join(board, observers, alone);
   if (observers.size() > 1) settle(bundle, observers);
   for (int round = 0; round < 2; ++round) {
@@ -64,8 +64,8 @@ RigCalibration calibrate_rig(const Board& board, std::span<const std::string> id
   const Eigen::MatrixXd all = covariance(bundle);
 
   RigCalibration out;
-  out.views.resize(ids.size());
-  for (std::size_t v = 0; v < ids.size(); ++v) {
+  out.views.resize(views);
+  for (std::size_t v = 0; v < views; ++v) {
     out.views[v].used = bundle.view_used[v] != 0;
     out.views[v].rms_px.assign(observers.size(), std::numeric_limits<double>::quiet_NaN());
     out.views[v].rig_from_board = bundle.rig_from_board[v];
@@ -108,10 +108,10 @@ RigCalibration calibrate_rig(const Board& board, std::span<const std::string> id
     squares += own, points += o.points;
     const double focal_sd = std::sqrt(o.covariance(0, 0)) / device.intrinsics[0];
     if (!(focal_sd < 0.1))
-      throw Error(ErrorCode::too_little_data,
-                  (observers[d].projector ? "projector: " : "camera " + observers[d].name + ": ") +
-                      "saw boards that leave its focal length open (sd " + std::to_string(std::lround(100 * focal_sd)) +
-                      " %), wanted boards tilted by 20 to 40 deg, both ways");
+      throw Error(ErrorCode::too_little_data, words_for(observers[d]) +
+                                                  ": saw boards that leave its focal length open (sd " +
+                                                  std::to_string(std::lround(100 * focal_sd)) +
+                                                  " %), wanted boards tilted by 20 to 40 deg, both ways");
     o.coverage = coverage_of(bundle, observers[d], static_cast<int>(d));
     o.ray_sd_px = ray_sd(device.intrinsics, o.covariance, observers[d].width, observers[d].height, o.coverage.points);
     out.observers.push_back(o);

@@ -17,8 +17,6 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
-std::string quoted(const std::string& name) { return name.empty() ? "the camera" : "camera " + name; }
-
 Sight sight_of(const Board& board, const BoardSighting& seen, int device, int view) {
   const std::vector<Vec3> points = board_points(board);
   Sight out{device, view, {}, seen.pixel, std::vector<char>(seen.pixel.size(), 1)};
@@ -66,7 +64,7 @@ void need_views(const Bundle& bundle, std::span<const BoardObserver> observers) 
       used += bundle.view_used[static_cast<std::size_t>(s.view)] != 0;
     }
     if (used >= kFewestViews) continue;
-    throw Error(ErrorCode::too_little_data, quoted(observers[d].name) + ": saw " + std::to_string(used) +
+    throw Error(ErrorCode::too_little_data, words_for(observers[d]) + ": saw " + std::to_string(used) +
                                                 (used == seen ? used == 1 ? " view of the board" : " views of the board"
                                                               : " of " + std::to_string(seen) + " views that agree") +
                                                 ", wanted " + std::to_string(kFewestViews) +
@@ -151,6 +149,11 @@ Link link(const Board& board, const Bundle& first, const Bundle& second) {
 
 }  // namespace
 
+std::string words_for(const BoardObserver& observer) {
+  if (observer.projector) return "the projector";
+  return observer.name.empty() ? "the camera" : "camera " + observer.name;
+}
+
 double robust_sigma(const Bundle& bundle, int device) {
   std::vector<double> all;
   for (const Sight& s : bundle.sights) {
@@ -170,7 +173,8 @@ void set_priors(Device& device, const BoardObserver& observer) {
       0.01 / (square * square * square);
 }
 
-Bundle calibrate_alone(const Board& board, const BoardObserver& observer, std::size_t views) {
+Bundle calibrate_alone(const Board& board, const BoardObserver& observer) {
+  const std::size_t views = observer.views.size();
   Bundle start;
   start.devices.resize(1);
   start.rig_from_board.assign(views, Pose::Identity());
@@ -212,7 +216,7 @@ Bundle calibrate_alone(const Board& board, const BoardObserver& observer, std::s
   }
   if (!std::isfinite(least))
     throw Error(ErrorCode::too_little_data,
-                quoted(observer.name) + ": saw boards that no lens fits, wanted points in the order of the board");
+                words_for(observer) + ": saw boards that no lens fits, wanted points in the order of the board");
   set_priors(best.devices[0], observer);
   settle(best, {&observer, 1});
   return best;
@@ -241,8 +245,8 @@ Bundle join(const Board& board, std::span<const BoardObserver> observers, const 
       }
     if (most == 0) {
       const auto lone = std::find(linked.begin(), linked.end(), 0) - linked.begin();
-      throw Error(ErrorCode::too_little_data, quoted(observers[static_cast<std::size_t>(lone)].name) +
-                                                  ": saw no view of the board that " + quoted(observers[0].name) +
+      throw Error(ErrorCode::too_little_data, words_for(observers[static_cast<std::size_t>(lone)]) +
+                                                  ": saw no view of the board that " + words_for(observers[0]) +
                                                   " has too, wanted " + std::to_string(kFewestViews) + " or more");
     }
     // The first one's numbers of the points, turned as its own link asks, count.

@@ -11,9 +11,12 @@
 /// The steps of calibrate_rig.
 namespace tribin::calibration_detail {
 
+/// "camera left", "the projector": for messages.
+std::string words_for(const BoardObserver& observer);
+
 /// One observer by itself: its intrinsics, and camera_from_board of the views that it has (sights in their order).
 /// \throws Error too_little_data for too few views.
-Bundle calibrate_alone(const Board& board, const BoardObserver& observer, std::size_t views);
+Bundle calibrate_alone(const Board& board, const BoardObserver& observer);
 
 /// All observers in the first one's frame, each board turned to agree. \throws Error too_little_data where an observer
 /// shares no view with the others.

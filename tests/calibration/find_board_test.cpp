@@ -192,7 +192,7 @@ RigCalibration calibrated(const BoardRig& rig, const PictureOptions& options, un
           find_board(test::board_picture(rig.board, device, pose, options, seed), rig.board).value_or(BoardSighting{}));
     observers.push_back(std::move(o));
   }
-  return calibrate_rig(rig.board, rig.ids, observers);
+  return calibrate_rig(rig.board, observers);
 }
 
 /// Pictures to parameters: the covariance holds with points as they are found, not only with drawn noise.

@@ -85,7 +85,7 @@ TEST(ProjectorPoints, HitTheTruthAndCalibrateTheProjector) {
     RecordProperty("projector_points_rms_px_" + std::to_string(seed), std::to_string(std::sqrt(squares / count)));
     EXPECT_LT(std::sqrt(squares / count), 0.1);
 
-    const RigCalibration result = calibrate_rig(rig.board, rig.ids, observers);
+    const RigCalibration result = calibrate_rig(rig.board, observers);
     EXPECT_LT(result.rms_px, 0.15);
     for (std::size_t d = 0; d < 2; ++d) {
       const auto want = test::intrinsics_of(rig.devices[d]), got = test::intrinsics_of(result.observers[d].camera);

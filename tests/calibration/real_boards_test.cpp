@@ -26,7 +26,7 @@ RigCalibration calibrated(const std::filesystem::path& folder) {
     const auto picture = read_picture(folder / "calib" / (k < 16 ? "L" : "R") / (ids[i] + ".png"));
     observers[static_cast<std::size_t>(k / 16)].views[i] = find_board(picture, board).value_or(BoardSighting{});
   });
-  return calibrate_rig(board, ids, observers);
+  return calibrate_rig(board, observers);
 }
 
 TEST(RealBoards, ConeAndCylinderByACalibrationOfTheirOwn) {

@@ -46,7 +46,7 @@ TEST(CalibrateRig, FindsAnyRigWithinItsCovariance) {
     const BoardRig rig = test::random_board_rig(
         seed,
         {.cameras = 1 + static_cast<int>(seed % 3), .projector = seed % 4 == 0, .focal = seed % 5 == 0 ? 2.5 : 1.2});
-    const RigCalibration result = calibrate_rig(rig.board, rig.ids, test::observed(rig, 0.1, seed));
+    const RigCalibration result = calibrate_rig(rig.board, test::observed(rig, 0.1, seed));
     Deviations own;
     compare(rig, result, own);
     EXPECT_LT(own.worst, 4.5);  // of some 5000 numbers: the Gaussian's worst is near 4
@@ -72,7 +72,7 @@ TEST(CalibrateRig, LeavesOutAndNamesWrongViews) {
     sim::Random random(seed);
     for (Vec2& p : seen[0].views[8].pixel) p += Vec2(8 * random.normal(), 8 * random.normal());
     seen[0].views[5].pixel[7] += Vec2(0, 4);
-    const RigCalibration result = calibrate_rig(rig.board, rig.ids, seen);
+    const RigCalibration result = calibrate_rig(rig.board, seen);
     for (std::size_t v = 0; v < result.views.size(); ++v) EXPECT_EQ(result.views[v].used, v != 3 && v != 8) << v;
     EXPECT_EQ(result.observers[0].dropped_points, 1);
     Deviations own;
@@ -96,7 +96,7 @@ TEST(CalibrateRig, TurnsBoardsThatLookAlike) {
         const int turn = turns[static_cast<std::size_t>(random.integer(0, static_cast<int>(turns.size()) - 1))];
         for (int& point : s.point) point = turned_point(rig.board, point, turn);
       }
-    const RigCalibration result = calibrate_rig(rig.board, rig.ids, seen);
+    const RigCalibration result = calibrate_rig(rig.board, seen);
     Deviations own;
     compare(rig, result, own);
     EXPECT_LT(own.worst, 4.5);
@@ -116,7 +116,7 @@ TEST(CalibrateRig, TurningFourTimesIsNothing) {
 TEST(CalibrateRig, SaysWhatIsMissing) {
   const auto message_of = [](const BoardRig& rig, const std::vector<BoardObserver>& seen) -> std::string {
     try {
-      calibrate_rig(rig.board, rig.ids, seen);
+      calibrate_rig(rig.board, seen);
     } catch (const Error& e) {
       EXPECT_EQ(e.code(), ErrorCode::too_little_data);
       return e.what();
@@ -142,7 +142,7 @@ TEST(CalibrateRig, SaysWhatIsMissing) {
 TEST(CalibrateRig, KnowsWhatTheViewsDoNotCover) {
   BoardRig rig = test::random_board_rig(3, {.cameras = 1, .views = 20});
   std::vector<BoardObserver> seen = test::observed(rig, 0.1, 3);
-  const ObserverCalibration whole = calibrate_rig(rig.board, rig.ids, seen).observers[0];
+  const ObserverCalibration whole = calibrate_rig(rig.board, seen).observers[0];
   for (double sd : whole.ray_sd_px) EXPECT_LT(sd, 0.5);
   for (BoardSighting& s : seen[0].views) {  // nothing right of the middle
     BoardSighting left;
@@ -150,7 +150,7 @@ TEST(CalibrateRig, KnowsWhatTheViewsDoNotCover) {
       if (s.pixel[i].x() < 640) left.point.push_back(s.point[i]), left.pixel.push_back(s.pixel[i]);
     s = left.point.size() < 12 ? BoardSighting{} : left;
   }
-  const ObserverCalibration o = calibrate_rig(rig.board, rig.ids, seen).observers[0];
+  const ObserverCalibration o = calibrate_rig(rig.board, seen).observers[0];
   EXPECT_EQ(o.coverage.points[2] + o.coverage.points[5] + o.coverage.points[8], 0);
   EXPECT_GT(o.coverage.points[3], 0);
   EXPECT_GT(o.ray_sd_px[5], 3 * whole.ray_sd_px[5]);
