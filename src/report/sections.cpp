@@ -217,6 +217,7 @@ std::string sentence_of(const Reason& r) {
       {"overlap", "Another instance explains the same points"},
       {"pixels", "Too few pixels would hold it"},
       {"visible_fraction", "Too little of it would be visible"},
+      {"measured_fraction", "Too little of it is measured"},
       {"cylinder_radius", "A cylinder's radius is another one's"},
       {"cylinder_height", "A cylinder's height is another one's"},
       {"superquadric", "The points do not lie on the ideal cylinder"},

@@ -27,6 +27,8 @@ struct Verification {
   double rms_sigma = 0;    ///< of the supported residuals, in local sigma
 
   double visible_fraction() const { return pixels ? double(pixels - occluded) / pixels : 0; }
+  /// Share of the silhouette that is measured and tells for or against.
+  double measured_fraction() const { return pixels ? double(judged()) / pixels : 0; }
   double support() const { return judged() ? double(supported) / judged() : 0; }
   double free_space() const { return judged() ? double(violated) / judged() : 0; }
   double contour() const { return outline ? double(outline_breaks) / outline : 0; }
