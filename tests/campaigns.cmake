@@ -14,3 +14,4 @@ endforeach()
 target_compile_definitions(campaign_paper PRIVATE TRIBIN_CLI="$<TARGET_FILE:tribin_cli>")
 add_dependencies(campaign_paper tribin_cli)
 target_include_directories(campaign_primitives PRIVATE ${CMAKE_CURRENT_SOURCE_DIR})
+target_include_directories(campaign_simulator PRIVATE ${PROJECT_SOURCE_DIR}/src)  # draws scenes as data sets do

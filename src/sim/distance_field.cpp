@@ -70,10 +70,14 @@ DistanceField::DistanceField(const Mesh& mesh) {
     for (int b = begin; b < end; ++b) {
       float* out = fine_.data() + static_cast<std::size_t>(b) * kNodes * kNodes * kNodes;
       const Vec3f corner = origin_ + coarse_ * Vec3f(blocks[b][0], blocks[b][1], blocks[b][2]);
+      double before = 1e30;  // the next node is at most a cell further off: a small ball to search
       for (int z = 0; z < kNodes; ++z)
         for (int y = 0; y < kNodes; ++y)
-          for (int x = 0; x < kNodes; ++x)
-            *out++ = static_cast<float>(exact.signed_distance((corner + cell_ * Vec3f(x, y, z)).cast<double>()));
+          for (int x = 0; x < kNodes; ++x) {
+            const double limit = x > 0 ? 1.001 * (std::abs(before) + cell_) + 1e-3 : 1e30;
+            before = exact.signed_distance((corner + cell_ * Vec3f(x, y, z)).cast<double>(), limit);
+            *out++ = static_cast<float>(before);
+          }
     }
   });
 }
