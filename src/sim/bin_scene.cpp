@@ -22,6 +22,7 @@ constexpr double kDamping = 0.9;    // share of speed lost in a second, then
 // on: dry friction holds parts that a solver lets creep.
 constexpr double kStill = 0.3;
 constexpr int kFreezeAfter = 240;
+constexpr double kPatience = 2;
 constexpr int kWindow = 60;
 
 /// A rotation drawn evenly from all. \source Shoemake, Graphics Gems III, 1992.
@@ -119,12 +120,14 @@ BinFill fill_bin(const std::vector<const Solid*>& parts, double length_mm, doubl
     world.step();
     if ((step - last) % kWindow != kWindow - 1) continue;
     drift = 0;
+    const double still =
+        kStill * std::exp2(std::max(0.0, static_cast<double>(step - last) / kStepsPerSecond - kPatience));
     for (int i = 0; i < world.size(); ++i) {
       if (world.frozen(i)) continue;
       const Pose now = world.world_from_part(i);
       const double moved = largest_motion(*parts[i], before[i], now);
       before[i] = now;
-      if (moved < kStill && step > last + kFreezeAfter)
+      if (moved < still && step > last + kFreezeAfter)
         world.freeze(i);
       else
         drift = std::max(drift, moved);
