@@ -14,6 +14,11 @@ namespace tribin::calibration_detail {
 /// "camera left", "the projector": for messages.
 std::string words_for(const BoardObserver& observer);
 
+double median(std::vector<double> values);
+
+/// The points of a sighting with their places on the board.
+Sight sight_of(const Board& board, const BoardSighting& seen, int device, int view);
+
 /// One observer by itself: its intrinsics, and camera_from_board of the views that it has (sights in their order).
 /// \throws Error too_little_data for too few views.
 Bundle calibrate_alone(const Board& board, const BoardObserver& observer);

@@ -83,11 +83,10 @@ inline constexpr double kOutlierView = 3;
 /// tenth of the diagonal; projectors: the height), and the displacement by k1, k2, p1, p2, k3 at the picture's corner
 /// (sd 30, 10, 1, 1, 1 % of the corner's distance from the middle).
 /// \param observers  one or more, all with the same number of views.
-/// \throws Error too_little_data for fewer views than kFewestViews, observers that share no view, or boards that all
-/// face
-///               a camera so that its focal length stays open; bad_option for a board that cannot be.
-/// \cost         a tenth of a second for 2 cameras and 15 views.
-/// \source       closed form: Zhang 2000; bundle adjustment with Schur complement: Triggs et al. 2000.
+/// \throws Error    too_little_data for fewer views than kFewestViews, observers that share no view, or boards that
+///                   all face a camera so that its focal length stays open; bad_option for a board that cannot be.
+/// \cost            a tenth of a second for 2 cameras and 15 views.
+/// \source          closed form: Zhang 2000; bundle adjustment with Schur complement: Triggs et al. 2000.
 RigCalibration calibrate_rig(const Board& board, std::span<const BoardObserver> observers);
 
 }  // namespace tribin
