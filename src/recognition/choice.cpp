@@ -218,6 +218,29 @@ PoseCandidate settled_on_scan(const SceneDepth& scene, const Part& part, const P
 
 namespace {
 
+// A right pose explains all that it judges but mixed pixels, what the part differs from its CAD, and what the sensor's
+// errors exceed its noise. On simulated heaps right ones have support of 0.966 and more, free space up to 0.008,
+// contours of 0.81 and more; a consumer depth camera (mp6d) leaves 0.89, 0.013 and 0.70. Impostors on heaps: support
+// below 0.85, or contours below 0.75 on little of the part, which the score tells.
+constexpr double kSupport = 0.85, kFreeSpace = 0.08, kContour = 0.65;
+
+/// \param slack  share of its surface that the pose may have wrong.
+bool keeps_limits(const Part& part, const PoseCandidate& candidate, double slack, std::vector<Reason>& rejected) {
+  const Verification& v = candidate.verification;
+  const auto fails = [&](const char* test, double value, double limit, bool bad) {
+    if (bad) add_reason(rejected, {part.name, "verification", test, value, limit, 1, place_of(part, candidate)});
+    return bad;
+  };
+  // 40 supported pixels fix a pose no better than chance does; less is not a look at a part.
+  if (fails("pixels", v.supported, 40, v.supported < 40)) return false;
+  // Less than a fifth of the part, measured, is not a look at it: any face of its size would do.
+  if (fails("measured_fraction", v.measured_fraction(), 0.2, v.measured_fraction() < 0.2)) return false;
+  if (fails("free_space", v.free_space(), kFreeSpace + slack, v.free_space() > kFreeSpace + slack)) return false;
+  if (fails("support", v.support(), kSupport - slack, v.support() < kSupport - slack)) return false;
+  if (fails("contour", v.contour(), kContour - slack, v.contour() < kContour - slack)) return false;
+  return true;
+}
+
 Polished polish_once(const SceneDepth& scene, std::span<const Part> parts, const PoseCandidate& settled) {
   const Part& part = parts[static_cast<std::size_t>(settled.part)];
   const double noise = 4 * scene.median_sigma_mm;
@@ -240,8 +263,18 @@ Polished polish_once(const SceneDepth& scene, std::span<const Part> parts, const
     checks[k] =
         verify_pose(part.render_mesh, scene, poses[k], verification_options(part, few, 0.004 * part.diameter_mm));
   });
-  double best = -1e300;
-  for (const Verification& v : checks) best = std::max(best, v.gain);
+  const auto leader = std::max_element(checks.begin(), checks.end(),
+                                       [](const Verification& a, const Verification& b) { return a.gain < b.gain; });
+  const double best = leader->gain;
+  // What no rival brings near the limits is none of them: finer steps gain a few hundredths.
+  PoseCandidate hope = settled;
+  hope.verification = *leader;
+  std::vector<Reason> ignored;
+  if (!keeps_limits(part, hope, 0.08, ignored)) {
+    Polished out;
+    out.candidate = hope;
+    return out;
+  }
   std::vector<std::size_t> order(poses.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::stable_sort(order.begin() + 1, order.end(),
@@ -315,33 +348,6 @@ Polished polish(const SceneDepth& scene, std::span<const Part> parts, const Pose
   }
   return out;
 }
-
-namespace {
-
-// A right pose explains all that it judges but mixed pixels, what the part differs from its CAD, and what the sensor's
-// errors exceed its noise. On simulated heaps right ones have support of 0.966 and more, free space up to 0.008,
-// contours of 0.81 and more; a consumer depth camera (mp6d) leaves 0.89, 0.013 and 0.70. Impostors on heaps: support
-// below 0.85, or contours below 0.75 on little of the part, which the score tells.
-constexpr double kSupport = 0.85, kFreeSpace = 0.08, kContour = 0.65;
-
-/// \param slack  share of its surface that the pose may have wrong.
-bool keeps_limits(const Part& part, const PoseCandidate& candidate, double slack, std::vector<Reason>& rejected) {
-  const Verification& v = candidate.verification;
-  const auto fails = [&](const char* test, double value, double limit, bool bad) {
-    if (bad) add_reason(rejected, {part.name, "verification", test, value, limit, 1, place_of(part, candidate)});
-    return bad;
-  };
-  // 40 supported pixels fix a pose no better than chance does; less is not a look at a part.
-  if (fails("pixels", v.supported, 40, v.supported < 40)) return false;
-  // Less than a fifth of the part, measured, is not a look at it: any face of its size would do.
-  if (fails("measured_fraction", v.measured_fraction(), 0.2, v.measured_fraction() < 0.2)) return false;
-  if (fails("free_space", v.free_space(), kFreeSpace + slack, v.free_space() > kFreeSpace + slack)) return false;
-  if (fails("support", v.support(), kSupport - slack, v.support() < kSupport - slack)) return false;
-  if (fails("contour", v.contour(), kContour - slack, v.contour() < kContour - slack)) return false;
-  return true;
-}
-
-}  // namespace
 
 bool plausible(const Part& part, const PoseCandidate& settled, std::vector<Reason>& rejected) {
   return keeps_limits(part, settled, 0.15, rejected);  // self-similar poses keep at least 85 % of the surface in place
