@@ -10,9 +10,9 @@
 namespace tribin::sim {
 namespace {
 
-// Fine cells: 1.25 mm keeps the rounding of edges (a quarter of a cell) near 0.3 mm, below the overlap of 0.5 mm that a
-// scene may have; small parts get 1/160 of their diameter, some thousand blocks for any shape.
-constexpr double kLargestCell = 1.25;
+// Fine cells: the field is off by half a cell at worst, at sharp edges, so that 1 mm keeps within the 0.5 mm that parts
+// may overlap; small parts get 1/160 of their diameter, some thousand blocks for any shape.
+constexpr double kLargestCell = 1;
 constexpr double kCellsPerDiameter = 160;
 // Fine nodes reach this far from the surface, so that contacts, which begin within 1 mm, are looked up in them.
 constexpr double kFineReach = 1.5;

@@ -10,7 +10,7 @@ namespace tribin::sim {
 
 /// Signed distance to a part's surface on a grid: fine near the surface, coarse elsewhere. Negative inside. Part frame,
 /// mm. Concave parts collide as they are: no convex pieces, and no limit on their number.
-/// Near flat and round faces it is exact to 0.02 cells; at sharp edges it rounds them by up to a quarter of a cell.
+/// On the surface itself it reads 0 within half a cell at sharp edges, a twentieth of one in the mean.
 class DistanceField {
  public:
   explicit DistanceField(const Mesh& mesh);

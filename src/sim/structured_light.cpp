@@ -164,7 +164,7 @@ void count_silhouette(const Body& body, const PinholeCamera& camera, BodyTruth& 
   int x0 = camera.width, x1 = -1, y0 = camera.height, y1 = -1;
   for (int v = top; v <= bottom; ++v)
     for (int u = left; u <= right; ++u)
-      if (alone.first_hit(camera.ray(u, v)).body >= 0) {
+      if (alone.first_hit(camera.ray(u, v)).body >= 0) {  // the same ray as for what is seen: the same rim
         ++truth.pixels_all;
         x0 = std::min(x0, u), x1 = std::max(x1, u), y0 = std::min(y0, v), y1 = std::max(y1, v);
       }

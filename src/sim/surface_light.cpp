@@ -46,8 +46,9 @@ SurfaceLight light_at(const RayScene& scene, const StructuredLight& s, const Vec
   const double falloff = reference / to_light.norm();
   light.diffuse =
       s.facing_modulation * (body.albedo / 0.5) * light.cos_light * (reference / s.reference_mm) * falloff * falloff;
-  const double mirror = std::pow(std::max(0.0, normal.dot((l + eye).normalized())), 200);
-  light.lobe = body.shine * s.highlight * mirror * falloff * falloff;
+  const double half = normal.dot((l + eye).normalized());
+  // Below 0.9 the lobe is less than 1e-9.
+  if (half > 0.9) light.lobe = body.shine * s.highlight * std::pow(half, 200) * falloff * falloff;
   return light;
 }
 

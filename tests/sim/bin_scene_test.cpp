@@ -4,11 +4,13 @@
 
 #include <cmath>
 #include <cstring>
+#include <filesystem>
 
 #include "sim/foreign_objects.hpp"
 #include "sim/random.hpp"
 #include "sim/solid.hpp"
 #include "tribin/core/error.hpp"
+#include "tribin/io/cad_files.hpp"
 
 namespace tribin::sim {
 namespace {
@@ -56,6 +58,24 @@ TEST(DistanceField, IsTheDistanceToThePart) {
       EXPECT_LE(s.field.lower_bound(p.cast<float>()), exact + 1e-3);
     }
   }
+}
+
+TEST(DistanceField, IsNearZeroOnEveryFaceOfAnAlternator) {
+  const Mesh mesh = read_cad(std::filesystem::path(TRIBIN_SOURCE_DIR) / "examples/parts/alternator_a.stl");
+  const DistanceField field(mesh);
+  Random random(7);
+  double sum = 0;
+  int n = 0;
+  for (const auto& t : mesh.triangles)
+    for (int i = 0; i < 4; ++i, ++n) {
+      double a = random.uniform(), b = random.uniform();
+      if (a + b > 1) a = 1 - a, b = 1 - b;
+      const Vec3f &o = mesh.vertices[t[0]], &u = mesh.vertices[t[1]], &w = mesh.vertices[t[2]];
+      const Vec3f p = o + static_cast<float>(a) * (u - o) + static_cast<float>(b) * (w - o);
+      EXPECT_LE(std::abs(field.at(p)), 0.5);
+      sum += std::abs(field.at(p));
+    }
+  EXPECT_LE(sum / n, 0.06);
 }
 
 TEST(Overlap, IsHowDeepOnePartLiesInTheOther) {
