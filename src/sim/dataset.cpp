@@ -71,6 +71,9 @@ ordered_json recipe_of(const DatasetOptions& options) {
 
 /// Goes on with a data set of the same recipe, or starts one.
 void open_dataset(const DatasetOptions& options, const fs::path& directory) {
+  const fs::path parent = fs::absolute(directory).lexically_normal().parent_path();
+  if (!fs::is_directory(directory.has_filename() ? parent : parent.parent_path()))
+    throw Error(ErrorCode::bad_option, directory.string() + ": saw no folder in which it could be made");
   const ordered_json recipe = recipe_of(options);
   const fs::path file = directory / "dataset.json";
   if (fs::exists(file)) {
