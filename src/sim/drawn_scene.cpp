@@ -129,7 +129,7 @@ DrawnScene draw_table_scene(const SceneStock& stock, const LevelSettings& level,
   const double half = 0.5 * kShareOfView * sensor.reference_mm;
   const Layout layout = lay_on_table(parts, half * sensor.camera.width / sensor.camera.fx,
                                      half * sensor.camera.height / sensor.camera.fy, random.bits());
-  scene.bodies = {{&stock.table, scene.camera_from_world, kTableAlbedo, /*shine=*/0}};
+  scene.bodies = {{&stock.table, scene.camera_from_world, kTableAlbedo, /*shine=*/0, /*counted=*/false}};
   scene.object_of_body = {0};
   const std::vector<double> albedo = drawn_albedos(meshes.size(), random);
   for (std::size_t i = 0; i < layout.laid.size(); ++i) {
@@ -182,8 +182,8 @@ DrawnScene draw_bin_scene(const SceneStock& stock, const LevelSettings& level, s
   scene.own = {bin_mesh(bin)};
   Pose below = Pose::Identity();
   below.translation().z() = -bin.wall_mm - 1;  // under the bin's feet, so that the two planes do not fight
-  scene.bodies = {{&stock.table, scene.camera_from_world * below, kTableAlbedo, /*shine=*/0},
-                  {scene.own.data(), scene.camera_from_world, kBinAlbedo, /*shine=*/0}};
+  scene.bodies = {{&stock.table, scene.camera_from_world * below, kTableAlbedo, /*shine=*/0, /*counted=*/false},
+                  {scene.own.data(), scene.camera_from_world, kBinAlbedo, /*shine=*/0, /*counted=*/false}};
   scene.object_of_body = {0, 0};
   const std::vector<double> albedo = drawn_albedos(meshes.size(), random);
   for (std::size_t i = 0; i < items.size(); ++i) {

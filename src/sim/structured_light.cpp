@@ -147,8 +147,10 @@ void add_mirrored(const RayScene& scene, const StructuredLight& s, const std::ve
     m.light.state = Invalid::out_of_view;
 }
 
-/// Silhouette of one body, were it alone.
-void count_silhouette(const Body& body, const PinholeCamera& camera, BodyTruth& truth) {
+/// Silhouette of one body, were it alone. Where it is seen, no ray need be cast again.
+void count_silhouette(const Body& body, int index, const Image<std::int16_t>& seen, const PinholeCamera& camera,
+                      BodyTruth& truth) {
+  if (!body.counted) return;
   double u0 = 1e9, v0 = 1e9, u1 = -1e9, v1 = -1e9;
   for (const Vec3f& vertex : body.mesh->vertices) {
     const Vec3 p = body.camera_from_body * Vec3(vertex.cast<double>());
@@ -164,7 +166,7 @@ void count_silhouette(const Body& body, const PinholeCamera& camera, BodyTruth& 
   int x0 = camera.width, x1 = -1, y0 = camera.height, y1 = -1;
   for (int v = top; v <= bottom; ++v)
     for (int u = left; u <= right; ++u)
-      if (alone.first_hit(camera.ray(u, v)).body >= 0) {  // the same ray as for what is seen: the same rim
+      if (seen(u, v) == index || alone.first_hit(camera.ray(u, v)).body >= 0) {
         ++truth.pixels_all;
         x0 = std::min(x0, u), x1 = std::max(x1, u), y0 = std::min(y0, v), y1 = std::max(y1, v);
       }
@@ -174,20 +176,18 @@ void count_silhouette(const Body& body, const PinholeCamera& camera, BodyTruth& 
 
 /// Counts and boxes of what is seen of each body.
 void count_visible(SimulatedScan& out) {
-  for (std::size_t b = 0; b < out.bodies.size(); ++b) {
-    BodyTruth& truth = out.bodies[b];
-    int x0 = out.body.width, x1 = -1, y0 = out.body.height, y1 = -1;
-    for (int v = 0; v < out.body.height; ++v)
-      for (int u = 0; u < out.body.width; ++u) {
-        if (out.body(u, v) != static_cast<int>(b)) continue;
-        ++truth.pixels_visible;
-        truth.pixels_measured += std::isfinite(out.scan.z_mm(u, v));
-        x0 = std::min(x0, u), x1 = std::max(x1, u), y0 = std::min(y0, v), y1 = std::max(y1, v);
-      }
-    if (x1 >= 0)
-      truth.box_visible[0] = x0, truth.box_visible[1] = y0, truth.box_visible[2] = x1 - x0 + 1,
-      truth.box_visible[3] = y1 - y0 + 1;
-  }
+  for (int v = 0; v < out.body.height; ++v)
+    for (int u = 0; u < out.body.width; ++u) {
+      if (out.body(u, v) < 0) continue;
+      BodyTruth& truth = out.bodies[out.body(u, v)];
+      int(&box)[4] = truth.box_visible;  // as corners, until all is counted
+      if (truth.pixels_visible++ == 0) box[0] = box[2] = u, box[1] = box[3] = v;
+      box[0] = std::min(box[0], u), box[2] = std::max(box[2], u), box[3] = v;
+      truth.pixels_measured += std::isfinite(out.scan.z_mm(u, v));
+    }
+  for (BodyTruth& truth : out.bodies)
+    if (truth.pixels_visible > 0)
+      truth.box_visible[2] += 1 - truth.box_visible[0], truth.box_visible[3] += 1 - truth.box_visible[1];
 }
 
 }  // namespace
@@ -272,7 +272,8 @@ SimulatedScan simulate_scan(const std::vector<Body>& bodies, const StructuredLig
     truth.camera_from_body = body.camera_from_body;
     out.bodies.push_back(truth);
   }
-  parallel_each(static_cast<int>(bodies.size()), [&](int b) { count_silhouette(bodies[b], camera, out.bodies[b]); });
+  parallel_each(static_cast<int>(bodies.size()),
+                [&](int b) { count_silhouette(bodies[b], b, out.body, camera, out.bodies[b]); });
   count_visible(out);
   return out;
 }

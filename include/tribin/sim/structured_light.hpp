@@ -39,7 +39,8 @@ struct Body {
   const Mesh* mesh = nullptr;
   Pose camera_from_body = Pose::Identity();
   double albedo = 0.5;
-  double shine = 1;  ///< 0 matt .. 1 machined metal: scales StructuredLight::highlight
+  double shine = 1;     ///< 0 matt .. 1 machined metal: scales StructuredLight::highlight
+  bool counted = true;  ///< false: scenery, whose whole silhouette nobody asks for: BodyTruth::pixels_all stays 0
 };
 
 /// What the camera sees of one body. Counts as in BOP.
