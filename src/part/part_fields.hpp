@@ -47,9 +47,9 @@ void each_field(Archive& to, T& loop) {
 
 template <class Archive, Is<Primitive> T>
 void each_field(Archive& to, T& primitive) {
-  auto& [id, type, axis, point, offset, radius, minor_radius, half_angle, extent_min, extent_max, arc, concave,
+  auto& [id, type, axis, point, offset, radius, minor_radius, half_angle, extent_min, extent_max, arc, concave, fillet,
          radius_from_cad, area, rms, points, covariance, surfels, loops, peak, name] = primitive;
-  to(id, type, axis, point, offset, radius, minor_radius, half_angle, extent_min, extent_max, arc, concave,
+  to(id, type, axis, point, offset, radius, minor_radius, half_angle, extent_min, extent_max, arc, concave, fillet,
      radius_from_cad, area, rms, points, covariance, surfels, loops, peak, name);
 }
 

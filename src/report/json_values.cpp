@@ -137,6 +137,7 @@ Json primitive(const Primitive& p, const HoughSpaces* spaces) {
       out["height_mm"] = millimetres(p.height_mm());
       out["arc_deg"] = degrees(p.arc);
       out["concave"] = p.concave;
+      out["fillet"] = p.fillet;
       break;
     case PrimitiveType::cone:
       out["axis"] = unit_vector(p.axis);
@@ -152,6 +153,7 @@ Json primitive(const Primitive& p, const HoughSpaces* spaces) {
       out["radius_mm"] = millimetres(p.radius_mm);
       out["minor_radius_mm"] = millimetres(p.minor_radius_mm);
       out["concave"] = p.concave;
+      out["fillet"] = p.fillet;
       break;
     case PrimitiveType::sphere:
       out["center_mm"] = millimetres(p.point);

@@ -340,9 +340,9 @@ std::string primitives_section(const std::vector<Primitive>& primitives, const P
     const bool high = p.type == PrimitiveType::cylinder || p.type == PrimitiveType::cone;
     out += "<tr" + link_to({key_of(p.id)}) + "><td>" + std::to_string(p.id) + "</td><td>" + type_icon(p.type) + " " +
            name_of(p.type) + (p.concave ? " <span class=\"muted\">concave</span>" : "") +
-           (p.name.empty() ? "" : " " + escaped(p.name)) + "</td>" + cell(number(p.area_mm2, 1)) +
-           cell(round ? number(p.radius_mm, 3) : "–") + cell(high ? number(p.height_mm(), 2) : "–") +
-           cell(high ? number(p.arc / kDegree, 0) : "–") +
+           (p.fillet ? " <span class=\"muted\">fillet</span>" : "") + (p.name.empty() ? "" : " " + escaped(p.name)) +
+           "</td>" + cell(number(p.area_mm2, 1)) + cell(round ? number(p.radius_mm, 3) : "–") +
+           cell(high ? number(p.height_mm(), 2) : "–") + cell(high ? number(p.arc / kDegree, 0) : "–") +
            cell(p.type == PrimitiveType::sphere
                     ? "–"
                     : number(axis.x(), 4) + "  " + number(axis.y(), 4) + "  " + number(axis.z(), 4)) +

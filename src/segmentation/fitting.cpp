@@ -300,4 +300,16 @@ Surface torus_of_tube(const Surfels& surfels, std::span<const std::uint32_t> sup
   return s;
 }
 
+Surface surface_of(const Primitive& p) {
+  Surface s;
+  s.type = p.type;
+  s.axis = p.axis;
+  s.point = p.point;
+  s.radius = p.radius_mm;
+  s.minor_radius = p.minor_radius_mm;
+  s.half_angle = p.half_angle;
+  s.concave = p.concave;
+  return s;
+}
+
 }  // namespace tribin::segmentation_detail

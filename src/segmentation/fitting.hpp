@@ -26,6 +26,9 @@ struct Surface {
   Vec3 normal(const Vec3& p) const;
 };
 
+/// The untrimmed surface of a primitive.
+Surface surface_of(const Primitive& primitive);
+
 /// How many numbers fix a surface of a type.
 int parameters_of(PrimitiveType type);
 

@@ -12,18 +12,6 @@ using namespace segmentation_detail;
 
 constexpr int kReach = 2;  // cells: a cell at an edge is refused, and so may be the one beside it
 
-Surface surface_of(const Primitive& p) {
-  Surface s;
-  s.type = p.type;
-  s.axis = p.axis;
-  s.point = p.point;
-  s.radius = p.radius_mm;
-  s.minor_radius = p.minor_radius_mm;
-  s.half_angle = p.half_angle;
-  s.concave = p.concave;
-  return s;
-}
-
 }  // namespace
 
 Image<std::uint16_t> label_pixels(const Primitives& primitives, const Surfels& surfels) {

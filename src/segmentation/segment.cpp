@@ -5,6 +5,7 @@
 #include "segmentation/boundary.hpp"
 #include "segmentation/cad_faces.hpp"
 #include "segmentation/consensus.hpp"
+#include "segmentation/fillets.hpp"
 #include "segmentation/loose_points.hpp"
 #include "segmentation/mesh_growth.hpp"
 #include "segmentation/spaces.hpp"
@@ -188,6 +189,7 @@ Primitives segment(const Surfels& given, const SegmentationOptions& options) {
     out.items[i].id = static_cast<int>(i + 1);
     for (std::uint32_t k : out.items[i].surfels) out.label_of_surfel[k] = out.items[i].id;
   }
+  mark_fillets(out, surfels);
   return out;
 }
 

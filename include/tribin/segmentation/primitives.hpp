@@ -48,6 +48,7 @@ struct Primitive {
   double extent_max = 0;         ///< last place
   double arc = 0;                ///< [rad] visible arc about the axis
   bool concave = false;          ///< seen from inside: a hole, a bore, a dish
+  bool fillet = false;           ///< cylinder, torus: goes over into its neighbours without an edge on both sides
   bool radius_from_cad = false;  ///< the radius was held at a nominal value (short arcs)
   double area_mm2 = 0;
   double rms_mm = 0;  ///< of the raw points (CAD: vertices) about the surface
