@@ -99,7 +99,7 @@ void each_field(Archive& to, T& part) {
 
 // The last value of each enum that is stored: a byte above it is no such enum.
 constexpr SurfaceType last_of(SurfaceType) { return SurfaceType::free_form; }
-constexpr PrimitiveType last_of(PrimitiveType) { return PrimitiveType::sphere; }
+constexpr PrimitiveType last_of(PrimitiveType) { return PrimitiveType::torus; }
 constexpr RelationType last_of(RelationType) { return RelationType::cylinder_cylinder; }
 
 // Types whose bytes are their value: numbers, and fixed arrays of them without gaps.

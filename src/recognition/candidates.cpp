@@ -166,7 +166,7 @@ Refinement refine_guarded(const Part& part, const SceneDepth& scene, const Pose&
 namespace {
 
 /// Hypotheses -> look-up -> settled -> rendered, each time fewer.
-/// \param coarse  as of look_up_all.
+/// \param settle_first  as `settle` of look_up_all.
 std::vector<PoseCandidate> sift(const SceneDepth& scene, const Part& part, int part_index,
                                 const std::vector<Pose>& poses, bool settle_first, std::vector<Reason>& rejected) {
   // At one place. Without a primitive's word for it the right pose stands further down the list.
