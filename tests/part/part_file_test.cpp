@@ -57,6 +57,15 @@ TEST(PartFile, GivesBackEveryBit) {
   EXPECT_EQ(part.diameter_mm, shaft().diameter_mm);
 }
 
+TEST(PartFile, KeepsEveryTypeOfPrimitive) {
+  Part part = shaft();
+  for (const PrimitiveType type : {PrimitiveType::plane, PrimitiveType::cylinder, PrimitiveType::cone,
+                                   PrimitiveType::sphere, PrimitiveType::torus}) {
+    part.model.primitives[0].type = type;
+    EXPECT_EQ(part_from_bytes(bytes_of_part(part, kKey), kKey).model.primitives[0].type, type) << name_of(type);
+  }
+}
+
 TEST(PartFile, RefusesWhatIsNotItself) {
   const std::string whole = bytes_of_part(shaft(), kKey);
   EXPECT_NE(refusal(whole, {1, 3}).find("key"), std::string::npos);
