@@ -1,7 +1,6 @@
 #include "tribin/report/calibration_json.hpp"
 
 #include <cmath>
-#include <cstdio>
 
 #include "report/json_values.hpp"
 #include "tribin/kinematics/rotation_conventions.hpp"
@@ -10,12 +9,7 @@ namespace tribin {
 namespace {
 
 using json::Json;
-
-std::string with(const char* format, double a, double b = 0, double c = 0) {
-  char text[300];
-  std::snprintf(text, sizeof text, format, a, b, c);
-  return text;
-}
+using json::with;
 
 /// A pose with the same rotation as a cell file takes it (interfaces.md, section 7).
 Json cell_pose(const Pose& pose) {

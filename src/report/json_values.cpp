@@ -240,4 +240,10 @@ std::string text_of(const Json& document) {
   return out + "\n";
 }
 
+std::string with(const char* format, double a, double b, double c) {
+  char text[300];
+  std::snprintf(text, sizeof text, format, a, b, c);
+  return text;
+}
+
 }  // namespace tribin::json

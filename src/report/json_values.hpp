@@ -44,4 +44,7 @@ Json counts(const std::vector<Primitive>& primitives);
 /// The document as text: two spaces a level, but vectors and matrix rows on one line; ends with a newline.
 std::string text_of(const Json& document);
 
+/// A sentence with up to three numbers, by a printf format for doubles.
+std::string with(const char* format, double a, double b = 0, double c = 0);
+
 }  // namespace tribin::json

@@ -1,7 +1,6 @@
 #include "tribin/report/rig_calibration_json.hpp"
 
 #include <cmath>
-#include <cstdio>
 
 #include "report/json_values.hpp"
 
@@ -9,12 +8,7 @@ namespace tribin {
 namespace {
 
 using json::Json;
-
-std::string with(const char* format, double a, double b = 0, double c = 0) {
-  char text[300];
-  std::snprintf(text, sizeof text, format, a, b, c);
-  return text;
-}
+using json::with;
 
 std::string name_of(const BoardObserver& o) { return o.projector ? o.name : "camera " + o.name; }
 
