@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 #include "sim/foreign_objects.hpp"
 #include "sim/random.hpp"
@@ -18,12 +19,23 @@ constexpr double kNearest = 560;      // mm, at which a sensor of 180 mm baselin
 constexpr double kShareOfView =
     0.9;  // of the table's view in which parts may lie: tall ones reach outwards in the image
 
-/// Which parts lie in a scene: indices, drawn from the classes that the level allows.
-std::vector<int> drawn_parts(const LevelSettings& level, int classes, Random& random) {
+/// Which parts lie in a scene: indices, drawn from the classes that the level allows. A cell has one camera, chosen for
+/// its smallest part: no class of a scene is more than three times as large as another.
+std::vector<int> drawn_parts(const LevelSettings& level, std::span<const double> diameters_mm, Random& random) {
+  constexpr double kLargestRatio = 3;
+  const int classes = static_cast<int>(diameters_mm.size());
   std::vector<int> order(classes);
   for (int i = 0; i < classes; ++i) order[i] = i;
   for (int i = classes - 1; i > 0; --i) std::swap(order[i], order[random.integer(0, i)]);
-  order.resize(random.integer(std::min(classes, level.fewest_classes), std::min(classes, level.most_classes)));
+  double smallest = diameters_mm[order[0]], largest = smallest;
+  std::erase_if(order, [&](int k) {
+    const double low = std::min(smallest, diameters_mm[k]), high = std::max(largest, diameters_mm[k]);
+    if (high > kLargestRatio * low) return true;
+    smallest = low, largest = high;
+    return false;
+  });
+  const int most = static_cast<int>(order.size());
+  order.resize(random.integer(std::min(most, level.fewest_classes), std::min(most, level.most_classes)));
   std::vector<int> drawn(random.integer(level.fewest_parts, level.most_parts));
   for (int& part : drawn) part = order[random.integer(0, static_cast<int>(order.size()) - 1)];
   return drawn;
@@ -60,10 +72,11 @@ struct Footprint {
 };
 
 /// The inside of a bin that holds the parts: the smallest of the sizes that are sold in which the heap is no higher
-/// than 0.8 of its width. Dropped parts fill about half of their heap with their hulls.
+/// than 0.45 of its width: crates for parts are wider than deep, or no camera sees their floor. Dropped parts fill
+/// about half of their heap with their hulls.
 Footprint bin_for(const std::vector<const Solid*>& parts) {
   constexpr Footprint kSizes[] = {{160, 110}, {243, 162}, {346, 265}, {544, 364}, {750, 550}, {1150, 750}};
-  constexpr double kPacking = 0.5, kHighest = 0.8, kRoom = 1.15;
+  constexpr double kPacking = 0.5, kHighest = 0.45, kRoom = 1.15;
   double volume = 0, largest = 0;
   for (const Solid* p : parts) volume += p->hull_volume_mm3(), largest = std::max(largest, p->diameter_mm());
   for (const Footprint& f : kSizes)
@@ -98,14 +111,14 @@ SceneStock make_stock(const std::vector<Mesh>& parts, SceneKind kind, const Leve
   SceneStock stock;
   stock.parts = &parts;
   stock.table = table_mesh();
+  for (const Mesh& part : parts) stock.diameters_mm.push_back(diameter(part.vertices));
   if (kind == SceneKind::table) {
     for (const Mesh& part : parts) stock.rests.push_back(stable_rests(part));
     return stock;
   }
   for (const Mesh& part : parts) stock.solids.emplace_back(part);
   if (level.most_foreign > 0) {
-    std::vector<double> diameters;
-    for (const Solid& s : stock.solids) diameters.push_back(s.diameter_mm());
+    std::vector<double> diameters = stock.diameters_mm;
     std::nth_element(diameters.begin(), diameters.begin() + diameters.size() / 2, diameters.end());
     stock.foreign_meshes = foreign_objects(diameters[diameters.size() / 2]);
     for (const Mesh& mesh : stock.foreign_meshes) stock.foreign.emplace_back(mesh);
@@ -116,7 +129,7 @@ SceneStock make_stock(const std::vector<Mesh>& parts, SceneKind kind, const Leve
 DrawnScene draw_table_scene(const SceneStock& stock, const LevelSettings& level, std::uint64_t seed) {
   Random random(seed);
   const std::vector<Mesh>& meshes = *stock.parts;
-  const std::vector<int> drawn = drawn_parts(level, static_cast<int>(meshes.size()), random);
+  const std::vector<int> drawn = drawn_parts(level, stock.diameters_mm, random);
   std::vector<TablePart> parts;
   for (const int k : drawn) parts.push_back({&meshes[k], &stock.rests[k]});
 
@@ -146,7 +159,7 @@ DrawnScene draw_table_scene(const SceneStock& stock, const LevelSettings& level,
 DrawnScene draw_bin_scene(const SceneStock& stock, const LevelSettings& level, std::uint64_t seed) {
   Random random(seed);
   const std::vector<Mesh>& meshes = *stock.parts;
-  const std::vector<int> drawn = drawn_parts(level, static_cast<int>(meshes.size()), random);
+  const std::vector<int> drawn = drawn_parts(level, stock.diameters_mm, random);
   struct Item {
     const Solid* solid;
     int object;

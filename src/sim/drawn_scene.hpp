@@ -24,6 +24,7 @@ struct DrawnScene {
 /// What is made once for all scenes of a data set. Points into the parts, which must stay.
 struct SceneStock {
   const std::vector<Mesh>* parts = nullptr;
+  std::vector<double> diameters_mm;            ///< of the parts
   std::vector<std::vector<StableRest>> rests;  ///< tables
   std::vector<Mesh> foreign_meshes;            ///< bins of levels with foreign objects
   std::vector<Solid> solids, foreign;          ///< bins
