@@ -1,0 +1,149 @@
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tribin/capture/hand_eye.hpp"
+#include "tribin/core/geometry.hpp"
+
+/// What stands where in a work cell: plain descriptions, read from TOML and checked. Millimetres and radians here; the
+/// file's keys name their own units. docs/work_cell.md lists every key.
+namespace tribin {
+
+struct CellCamera {
+  std::filesystem::path file;  ///< camera file (intrinsics, noise)
+  CameraMount mount = CameraMount::fixed;
+};
+
+/// Where the camera stands: on the base (fixed) or on the flange (hand).
+struct CellHandEye {
+  Pose parent_from_camera = Pose::Identity();  ///< base_from_camera or flange_from_camera
+  double sigma_mm = 0;                         ///< of its position, 0 = not said
+  double sigma_rad = 0;                        ///< of its rotation, 0 = not said
+};
+
+/// An open bin. Its frame: origin on the inner floor's middle, x along the first inner side, z up.
+struct CellBin {
+  Pose base_from_bin = Pose::Identity();
+  Vec3 inner_size_mm = Vec3::Zero();  ///< length, width, height
+  double wall_mm = 8;                 ///< of walls and floor
+};
+
+struct CellBox {
+  Vec3 center_mm = Vec3::Zero();  ///< axes of the frame it is given in
+  Vec3 size_mm = Vec3::Zero();
+};
+
+struct CellCylinder {
+  Vec3 center_mm = Vec3::Zero();  ///< the middle of its axis
+  Vec3 axis = Vec3::UnitZ();      ///< unit
+  double radius_mm = 0;
+  double height_mm = 0;
+};
+
+enum class GripperKind { parallel_outside, parallel_inside, three_jaw, suction, magnet };
+
+struct Gripper {
+  std::string name;
+  GripperKind kind = GripperKind::parallel_outside;
+  std::array<double, 2> stroke_mm{0, 0};  ///< least and largest opening; 0, 0 for suction and magnets
+  double force_n = 0;                     ///< of closing, or of holding
+  double cup_radius_mm = 0;               ///< suction and magnets
+  Pose flange_from_tcp = Pose::Identity();
+  std::vector<CellBox> boxes;           ///< its body, frame of the flange
+  std::vector<CellCylinder> cylinders;  ///< the same
+};
+
+/// A place where a part is to be gripped, given by hand.
+struct PickPoint {
+  std::string name;
+  std::string gripper;  ///< empty = any of the part's
+  Pose part_from_tcp = Pose::Identity();
+  double priority = 1;  ///< weight of its score, > 0
+};
+
+struct CellPart {
+  std::string name;
+  std::filesystem::path cad;
+  std::string unit = "mm";  ///< of CAD files that name none: mm, cm, m, inch
+  double mass_kg = 0;       ///< 0 = not known
+  std::vector<std::string> grippers;
+  double max_tilt_rad = 40 * kDegree;  ///< of the approach to the vertical
+  std::vector<PickPoint> pick_points;  ///< empty = grasps are found from the part's surfaces
+};
+
+struct RackSlots {
+  int rows = 1, columns = 1, layers = 1;
+  Vec3 pitch_mm = Vec3::Zero();  ///< from column to column (x), row to row (y), layer to layer (z)
+  double stagger_mm = 0;         ///< shift along x of every second row
+};
+
+struct Rack {
+  Pose base_from_rack = Pose::Identity();  ///< the first slot; z up
+  RackSlots slots;
+  std::vector<std::string> sequence;  ///< names of parts, used in turn
+  double chamfer_mm = 0;              ///< of a slot: what a place error may be
+};
+
+enum class ControllerKind { nx100, hses, text };
+
+struct CellController {
+  ControllerKind kind = ControllerKind::nx100;
+  std::string address = "127.0.0.1";
+  int port = 80;
+};
+
+struct CellRobot {
+  std::filesystem::path model;  ///< geometry file of the arm
+  CellController controller;
+  double speed_cap_mm_s = 250;
+};
+
+/// A box along the base's axes.
+struct CellRange {
+  Vec3 min = Vec3::Zero();
+  Vec3 max = Vec3::Zero();
+};
+
+struct Safety {
+  bool allow_arm = false;                 ///< motion needs this and --arm
+  std::optional<CellRange> workspace_mm;  ///< where the TCP may be; none = nowhere but in a dry run
+  std::vector<CellRange> forbidden_mm;
+  double scan_max_age_s = 10;  ///< of a scan that motion goes by
+};
+
+struct WorkCell {
+  std::filesystem::path file;  ///< for messages; the files named in it are sought beside it
+  std::optional<CellCamera> camera;
+  CellHandEye hand_eye;  ///< the identity where it is left out: then base means camera
+  std::optional<CellBin> bin;
+  std::vector<Gripper> grippers;
+  std::vector<CellPart> parts;
+  std::optional<Rack> rack;
+  std::vector<CellRobot> robots;
+  Safety safety;
+  std::vector<std::string> warnings;
+
+  CameraMount mount() const { return camera ? camera->mount : CameraMount::fixed; }
+};
+
+/// Reads a work cell; it must have [camera]. What else a command needs it asks for itself. Paths are made to lead from
+/// the working directory. \throws Error bad_input (file, line and column, seen, wanted) for what is no TOML, unknown
+/// keys, wrong types, values out of range, equal names, and names that lead nowhere.
+WorkCell read_work_cell(const std::filesystem::path& path);
+
+/// Reads a bin: a file with [bin] alone, or a work cell. Without [hand_eye], base_from_bin is where the camera sees it.
+/// \throws Error as read_work_cell; [bin] is wanted, [camera] is not.
+WorkCell read_bin(const std::filesystem::path& path);
+
+/// Where the camera was. \param base_from_flange  of the scan; needed by a camera on the flange.
+/// \throws Error bad_input where it is needed and missing.
+Pose base_from_camera(const WorkCell& cell, const std::optional<Pose>& base_from_flange = {});
+
+/// The table of all keys, as docs/work_cell.md shows it: key, unit, range, default, meaning. Markdown.
+std::string work_cell_keys();
+
+}  // namespace tribin
