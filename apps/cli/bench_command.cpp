@@ -30,13 +30,9 @@ struct Options {
 /// The bound's sd of the box's centre [mm] and of the rotation [rad], as norms.
 void set_bound(PaperRun& run, const sim::PaperScene& scene, const Part& part, double correlation_px) {
   const Matrix6 bound = sim::cramer_rao_bound(scene.simulated, 1, correlation_px);
-  const Vec3 arm = scene.camera_from_part.linear() * part.box_center();
-  Matrix3 minus_arm_cross;  // the centre moves by dt + w x arm
-  minus_arm_cross << 0, arm.z(), -arm.y(), -arm.z(), 0, arm.x(), arm.y(), -arm.x(), 0;
-  Eigen::Matrix<double, 3, 6> j;
-  j << Matrix3::Identity(), minus_arm_cross;
-  run.bound_translation_mm = std::sqrt((j * bound * j.transpose()).trace());
-  run.bound_rotation = std::sqrt(bound.bottomRightCorner<3, 3>().trace());
+  const sim::PoseBound norms = sim::pose_bound(bound, scene.camera_from_part, part.box_center());
+  run.bound_translation_mm = norms.translation_mm;
+  run.bound_rotation = norms.rotation;
 }
 
 /// The test that stopped those candidates of a part which came furthest.

@@ -17,6 +17,7 @@ struct Options {
   std::string kind = "table", level = "easy", out, unit = "mm";
   int scenes = 1;
   std::uint64_t seed = 1;
+  double systematic = -1, scale_error = 0;
   bool frames = false;
 };
 
@@ -28,6 +29,8 @@ int run(const Options& options, const Context& context) {
   dataset.scenes = options.scenes;
   dataset.seed = options.seed;
   dataset.frames = options.frames;
+  if (options.systematic >= 0) dataset.systematic = options.systematic;
+  dataset.scale_error = options.scale_error;
   for (const PartArgument& part : part_arguments(options.parts)) {
     dataset.parts.push_back(read_cad(part.file, {.unit = length_unit_from_name(options.unit)}));
     dataset.parts.back().name = part.name;
@@ -57,13 +60,23 @@ void add_simulate(CLI::App& app, Context& context) {
       ->required()
       ->type_name("[NAME=]CAD")
       ->allow_extra_args(false);
-  command->add_option("--kind", options->kind, "table: side by side; bin: a heap made by physics")->type_name("K");
+  command
+      ->add_option("--kind", options->kind,
+                   "table: side by side; bin: a heap made by physics; empty, foreign: a bin without parts")
+      ->type_name("K");
   command->add_option("--level", options->level, "easy, dense, hard: parts, noise, tilt, lost pixels")->type_name("L");
   command->add_option("-o", options->out, "Folder of the data set; scenes that it holds are kept")
       ->required()
       ->type_name("DIR");
   command->add_option("--scenes", options->scenes, "How many")->check(CLI::Range(1, 1000000))->type_name("N");
   command->add_option("--seed", options->seed, "The same seed gives the same scenes")->type_name("S");
+  command
+      ->add_option("--systematic", options->systematic, "Largest relative depth error over the image, not the level's")
+      ->check(CLI::Range(0.0, 0.1))
+      ->type_name("X");
+  command->add_option("--scale-error", options->scale_error, "Sd of a relative depth error that a whole scene has")
+      ->check(CLI::Range(0.0, 0.1))
+      ->type_name("X");
   command->add_flag("--frames", options->frames, "Also the camera's pictures of the patterns, with rig.json, for scan");
   command->add_option("--unit", options->unit, "Unit of CAD files that name none: mm, cm, m, inch")->type_name("U");
   command->callback([options, &context] { context.run = [options, &context] { return run(*options, context); }; });

@@ -10,6 +10,7 @@
 #include "tribin/cad/measure.hpp"
 #include "tribin/core/error.hpp"
 #include "tribin/io/write.hpp"
+#include "tribin/part/symmetry.hpp"
 
 namespace tribin::sim {
 namespace {
@@ -40,6 +41,21 @@ ordered_json row_wise(const Eigen::MatrixBase<Derived>& m) {
 }
 
 ordered_json intrinsics(const PinholeCamera& c) { return {c.fx, 0, c.cx, 0, c.fy, c.cy, 0, 0, 1}; }
+
+ordered_json row_wise4(const Pose& pose) { return row_wise(pose.matrix()); }
+
+/// The keys of models_info.json that tell which poses are the same, and which are nearly.
+ordered_json symmetries(const Mesh& part) {
+  const SymmetryResult found = find_symmetries(part);
+  ordered_json out = ordered_json::object();
+  for (std::size_t k = 1; k < found.group.discrete.size(); ++k)  // BOP leaves the identity out
+    out["symmetries_discrete"].push_back(row_wise4(found.group.discrete[k]));
+  for (const ContinuousSymmetry& s : found.group.continuous)
+    out["symmetries_continuous"].push_back({{"axis", row_wise(s.axis)}, {"offset", row_wise(s.point)}});
+  for (const SelfSimilarPose& pose : found.self_similar)
+    out["near_symmetries_discrete"].push_back(row_wise4(pose.part_from_part));
+  return out;
+}
 
 void write_mask(const fs::path& path, const Image<std::int16_t>& bodies, int body) {
   Image<std::uint8_t> mask(bodies.width, bodies.height);
@@ -103,6 +119,7 @@ void write_bop_models(const fs::path& dataset, const std::vector<Mesh>& parts, c
                                 {"min_x", box.min.x()},     {"min_y", box.min.y()},
                                 {"min_z", box.min.z()},     {"size_x", box.size().x()},
                                 {"size_y", box.size().y()}, {"size_z", box.size().z()}};
+    info[std::to_string(id)].update(symmetries(parts[i]));
   }
   write_json(dataset / "models" / "models_info.json", info);
   write_json(dataset / "camera.json", {{"cx", camera.cx},
@@ -142,14 +159,18 @@ void write_bop_scene(const fs::path& folder, const BopImage& image, int classes,
          {"px_count_measured", t.pixels_measured},
          {"visib_fract", t.visible_fraction()},
          {"measured_fract", t.pixels_all > 0 ? static_cast<double>(t.pixels_measured) / t.pixels_all : 0.0}});
+    if (image.bounds.empty() || image.bounds[b].translation_mm <= 0) continue;
+    info.back()["bound_mm"] = image.bounds[b].translation_mm;
+    info.back()["bound_deg"] = image.bounds[b].rotation / kDegree;
   }
   write_json(folder / "scene_gt.json", {{"0", gt}});
   write_json(folder / "scene_gt_info.json", {{"0", info}});
-  write_json(folder / "scene_camera.json", {{"0",
-                                             {{"cam_K", intrinsics(s.scan.camera)},
-                                              {"depth_scale", depth_scale},
-                                              {"cam_R_w2c", row_wise(image.camera_from_world.linear())},
-                                              {"cam_t_w2c", row_wise(image.camera_from_world.translation())}}}});
+  ordered_json camera = {{"cam_K", intrinsics(s.scan.camera)},
+                         {"depth_scale", depth_scale},
+                         {"cam_R_w2c", row_wise(image.camera_from_world.linear())},
+                         {"cam_t_w2c", row_wise(image.camera_from_world.translation())}};
+  if (image.scale_error > 0) camera["scale_error"] = image.scale_error;
+  write_json(folder / "scene_camera.json", {{"0", camera}});
   ordered_json all = ordered_json::array();
   for (int k = 1; k <= classes; ++k) all.push_back(k);
   write_json(folder / "scene_parts.json", {{"0", all}});

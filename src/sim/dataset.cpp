@@ -11,11 +11,13 @@
 #include "io/atomic_file.hpp"
 #include "sim/drawn_scene.hpp"
 #include "sim/random.hpp"
+#include "tribin/cad/measure.hpp"
 #include "tribin/core/error.hpp"
 #include "tribin/core/parallel.hpp"
 #include "tribin/io/frames_file.hpp"
 #include "tribin/io/rig_file.hpp"
 #include "tribin/sim/bop_writer.hpp"
+#include "tribin/sim/paper_experiment.hpp"
 #include "tribin/sim/render_frames.hpp"
 
 namespace tribin::sim {
@@ -24,7 +26,7 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 
-constexpr const char* kKinds[] = {"table", "bin"};
+constexpr const char* kKinds[] = {"table", "bin", "empty", "foreign"};
 
 void check(const DatasetOptions& options) {
   if (options.parts.empty())
@@ -61,12 +63,15 @@ ordered_json recipe_of(const DatasetOptions& options) {
       for (int k = 0; k < 3; ++k) hash = mixed(hash ^ std::bit_cast<std::uint32_t>(v[k]));
     parts.push_back({{"name", part.name}, {"hash", hash}});
   }
-  return {{"kind", kKinds[static_cast<int>(options.kind)]},
-          {"level", settings_of(options.level).name},
-          {"seed", options.seed},
-          {"frames", options.frames},
-          {"version", TRIBIN_VERSION},
-          {"parts", parts}};
+  ordered_json recipe = {{"kind", kKinds[static_cast<int>(options.kind)]},
+                         {"level", settings_of(options.level).name},
+                         {"seed", options.seed},
+                         {"frames", options.frames},
+                         {"version", TRIBIN_VERSION},
+                         {"parts", parts}};
+  if (options.systematic) recipe["systematic"] = *options.systematic;
+  if (options.scale_error > 0) recipe["scale_error"] = options.scale_error;
+  return recipe;
 }
 
 /// Goes on with a data set of the same recipe, or starts one.
@@ -104,12 +109,33 @@ void write_frames_of(const DrawnScene& drawn, std::uint64_t seed, const fs::path
   write_rig(folder / "rig.json", rig_of(drawn.sensor, render));
 }
 
+// The rms over the image of a quadratic whose coefficients are drawn in [-1, 1] and scaled to a sum of 1, as
+// simulate_scan has it: E[c^2] = 0.038 each, times 1 + 2/3 + 2/5 + 1/9 for the powers of x and y.
+constexpr double kShapeRms = 0.29;
+
+/// How well the pixels of each part could tell its pose, nothing systematic counted; 0 where a direction is free.
+std::vector<PoseBound> bounds_of(const SimulatedScan& simulated, const DrawnScene& drawn) {
+  std::vector<PoseBound> out(simulated.bodies.size());
+  for (std::size_t b = 0; b < out.size(); ++b) {
+    if (drawn.object_of_body[b] == 0 || simulated.bodies[b].pixels_measured == 0) continue;
+    try {
+      out[b] = pose_bound(cramer_rao_bound(simulated, static_cast<int>(b), drawn.sensor.noise_correlation_px),
+                          drawn.bodies[b].camera_from_body, bounding_box(drawn.bodies[b].mesh->vertices).center());
+    } catch (const Error&) {
+      // A part of revolution, or one that shows too little: it has no bound.
+    }
+  }
+  return out;
+}
+
 /// Makes one scene and puts it in its place.
 void make_scene(const DatasetOptions& options, const SceneStock& stock, int scene, const fs::path& directory) {
   const LevelSettings& level = settings_of(options.level);
   const std::uint64_t seed = mixed(options.seed * 1000003u + static_cast<std::uint64_t>(scene));
-  const DrawnScene drawn =
-      options.kind == SceneKind::table ? draw_table_scene(stock, level, seed) : draw_bin_scene(stock, level, seed);
+  DrawnScene drawn = options.kind == SceneKind::table ? draw_table_scene(stock, level, seed)
+                                                      : draw_bin_scene(stock, options.kind, level, seed);
+  if (options.systematic) drawn.sensor.systematic = *options.systematic;
+  if (options.scale_error > 0) drawn.sensor.scale = 1 + options.scale_error * Random(mixed(seed ^ 0x5CA1Eu)).normal();
   const SimulatedScan simulated = simulate_scan(drawn.bodies, drawn.sensor, seed);
   const auto objects = std::count_if(drawn.object_of_body.begin(), drawn.object_of_body.end(), [](int k) { return k; });
   ordered_json info = {{"kind", kKinds[static_cast<int>(options.kind)]},
@@ -119,6 +145,7 @@ void make_scene(const DatasetOptions& options, const SceneStock& stock, int scen
                        {"sigma_i", drawn.sensor.image_noise},
                        {"noise_correlation_px", drawn.sensor.noise_correlation_px},
                        {"systematic", drawn.sensor.systematic},
+                       {"scale", drawn.sensor.scale},
                        {"mirror_share", drawn.sensor.mirror_share},
                        {"lost", drawn.sensor.lost_share}};
   info.update(drawn.info);
@@ -126,7 +153,9 @@ void make_scene(const DatasetOptions& options, const SceneStock& stock, int scen
 
   const fs::path unfinished = unfinished_scenes(directory) / scene_name(scene);
   fs::remove_all(unfinished);
-  write_bop_scene(unfinished, {&simulated, drawn.camera_from_world, drawn.object_of_body},
+  write_bop_scene(unfinished,
+                  {&simulated, drawn.camera_from_world, drawn.object_of_body, bounds_of(simulated, drawn),
+                   std::hypot(options.scale_error, kShapeRms * drawn.sensor.systematic)},
                   static_cast<int>(options.parts.size()), depth_scale_for(drawn.largest_depth_mm));
   if (options.frames) write_frames_of(drawn, seed, unfinished / "frames");
   io::write_file(unfinished / "scene_info.json", info.dump(1) + "\n");
@@ -153,9 +182,9 @@ void write_lists(const DatasetOptions& options, const fs::path& directory) {
 }  // namespace
 
 SceneKind scene_kind_of(const std::string& name) {
-  if (name == kKinds[0]) return SceneKind::table;
-  if (name == kKinds[1]) return SceneKind::bin;
-  throw Error(ErrorCode::bad_option, "--kind is \"" + name + "\"; wanted table or bin");
+  for (std::size_t i = 0; i < std::size(kKinds); ++i)
+    if (name == kKinds[i]) return static_cast<SceneKind>(i);
+  throw Error(ErrorCode::bad_option, "--kind is \"" + name + "\"; wanted table, bin, empty or foreign");
 }
 
 fs::path unfinished_scenes(const fs::path& directory) { return directory / ".unfinished"; }

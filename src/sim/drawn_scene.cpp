@@ -13,9 +13,10 @@
 namespace tribin::sim {
 namespace {
 
-constexpr double kTableAlbedo = 0.2;  // a dark work bench: 2.5 times the noise of a bright part
-constexpr double kBinAlbedo = 0.25;   // grey plastic
-constexpr double kNearest = 560;      // mm, at which a sensor of 180 mm baseline is focused
+constexpr double kTableAlbedo = 0.2;             // a dark work bench: 2.5 times the noise of a bright part
+constexpr double kBinAlbedo = 0.25;              // grey plastic
+constexpr double kNearest = 560;                 // mm, at which a sensor of 180 mm baseline is focused
+constexpr int kFewestAlone = 3, kMostAlone = 8;  // foreign objects in a bin that holds nothing else
 constexpr double kShareOfView =
     0.9;  // of the table's view in which parts may lie: tall ones reach outwards in the image
 
@@ -117,7 +118,7 @@ SceneStock make_stock(const std::vector<Mesh>& parts, SceneKind kind, const Leve
     return stock;
   }
   for (const Mesh& part : parts) stock.solids.emplace_back(part);
-  if (level.most_foreign > 0) {
+  if (level.most_foreign > 0 || kind == SceneKind::foreign) {
     std::vector<double> diameters = stock.diameters_mm;
     std::nth_element(diameters.begin(), diameters.begin() + diameters.size() / 2, diameters.end());
     stock.foreign_meshes = foreign_objects(diameters[diameters.size() / 2]);
@@ -156,7 +157,7 @@ DrawnScene draw_table_scene(const SceneStock& stock, const LevelSettings& level,
   return scene;
 }
 
-DrawnScene draw_bin_scene(const SceneStock& stock, const LevelSettings& level, std::uint64_t seed) {
+DrawnScene draw_bin_scene(const SceneStock& stock, SceneKind kind, const LevelSettings& level, std::uint64_t seed) {
   Random random(seed);
   const std::vector<Mesh>& meshes = *stock.parts;
   const std::vector<int> drawn = drawn_parts(level, stock.diameters_mm, random);
@@ -166,15 +167,22 @@ DrawnScene draw_bin_scene(const SceneStock& stock, const LevelSettings& level, s
   };
   std::vector<Item> items;
   for (const int k : drawn) items.push_back({&stock.solids[k], k + 1});
+  std::vector<const Solid*> solids;
+  for (const Item& item : items) solids.push_back(item.solid);
+  if (kind != SceneKind::bin) items.clear();  // the parts that are not there still tell how large the bin is
   // Foreign objects fall at any time among the parts.
-  const int foreign = stock.foreign.empty() ? 0 : random.integer(level.fewest_foreign, level.most_foreign);
+  const int foreign = kind == SceneKind::foreign ? random.integer(kFewestAlone, kMostAlone)
+                      : kind == SceneKind::empty || level.most_foreign == 0
+                          ? 0
+                          : random.integer(level.fewest_foreign, level.most_foreign);
   for (int i = 0; i < foreign; ++i) {
     const Item item{&stock.foreign[random.integer(0, static_cast<int>(stock.foreign.size()) - 1)], 0};
     items.insert(items.begin() + random.integer(0, static_cast<int>(items.size())), item);
+    if (kind == SceneKind::bin) solids.push_back(item.solid);
   }
-  std::vector<const Solid*> solids;
-  for (const Item& item : items) solids.push_back(item.solid);
   const Footprint inside = bin_for(solids);
+  solids.clear();
+  for (const Item& item : items) solids.push_back(item.solid);
   const BinFill fill = fill_bin(solids, inside.length, inside.width, random.bits());
 
   // The rim is as high as any part leans on the walls at least; bins are filled to the brim, or hardly half.

@@ -33,6 +33,7 @@ struct SceneStock {
 SceneStock make_stock(const std::vector<Mesh>& parts, SceneKind kind, const LevelSettings& level);
 
 DrawnScene draw_table_scene(const SceneStock& stock, const LevelSettings& level, std::uint64_t seed);
-DrawnScene draw_bin_scene(const SceneStock& stock, const LevelSettings& level, std::uint64_t seed);
+/// \param kind  bin, empty or foreign.
+DrawnScene draw_bin_scene(const SceneStock& stock, SceneKind kind, const LevelSettings& level, std::uint64_t seed);
 
 }  // namespace tribin::sim

@@ -85,4 +85,13 @@ Matrix6 cramer_rao_bound(const SimulatedScan& simulated, int body, double correl
   return covariance * std::max(1.0, 4 * kPi * correlation_px * correlation_px);
 }
 
+PoseBound pose_bound(const Matrix6& covariance, const Pose& camera_from_part, const Vec3& point) {
+  const Vec3 arm = camera_from_part.linear() * point;
+  Matrix3 minus_arm_cross;  // the point moves by dt + w x arm
+  minus_arm_cross << 0, arm.z(), -arm.y(), -arm.z(), 0, arm.x(), arm.y(), -arm.x(), 0;
+  Eigen::Matrix<double, 3, 6> j;
+  j << Matrix3::Identity(), minus_arm_cross;
+  return {std::sqrt((j * covariance * j.transpose()).trace()), std::sqrt(covariance.bottomRightCorner<3, 3>().trace())};
+}
+
 }  // namespace tribin::sim

@@ -263,7 +263,7 @@ SimulatedScan simulate_scan(const std::vector<Body>& bodies, const StructuredLig
             sensor.systematic * (c[0] + c[1] * x + c[2] * y + c[3] * x * x + c[4] * x * y + c[5] * y * y);
         out.sigma_mm(u, v) = static_cast<float>(sigma);
         out.scan.modulation(u, v) = static_cast<std::uint8_t>(std::clamp(m.light.modulation, 0.0, 255.0));
-        out.scan.z_mm(u, v) = static_cast<float>(m.z * (1 + error) + sigma * noise(u, v));
+        out.scan.z_mm(u, v) = static_cast<float>(m.z * (sensor.scale + error) + sigma * noise(u, v));
       }
   });
 

@@ -50,7 +50,7 @@ struct Worst {
 
 void run_scene(const SceneStock& stock, const LevelSettings& level, std::uint64_t seed, Worst& worst) {
   const double start = seconds();
-  DrawnScene scene = draw_bin_scene(stock, level, seed);
+  DrawnScene scene = draw_bin_scene(stock, SceneKind::bin, level, seed);
   // Neither is a matter of light: the calibration's error, and pixels lost for no reason that is modelled.
   scene.sensor.systematic = scene.sensor.lost_share = 0;
   const double filled = seconds();

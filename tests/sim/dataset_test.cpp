@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -43,6 +44,32 @@ class BinDataset : public testing::Test {
   }
   DatasetOptions options_;
 };
+
+TEST_F(BinDataset, HoldsNoPartWhereNoneIsWanted) {
+  for (const SceneKind kind : {SceneKind::empty, SceneKind::foreign}) {
+    fs::remove_all(folder("whole"));
+    options_.kind = kind;
+    simulate_dataset(options_, folder("whole"));
+    EXPECT_TRUE(json_of(folder("whole") / "test/000001/scene_gt.json").at("0").empty());
+    const int foreign = json_of(folder("whole") / "scene_info.json").at("1").at("foreign");
+    EXPECT_EQ(foreign > 0, kind == SceneKind::foreign);
+  }
+}
+
+TEST_F(BinDataset, TellsTheBoundOfEachPartAndTheScalesError) {
+  options_.parts = {foreign_objects(60).back()};  // the angle: no turn leaves it as it is
+  options_.systematic = 0;
+  options_.scale_error = 0.001;
+  simulate_dataset(options_, folder("whole"));
+  const fs::path scene = folder("whole") / "test/000001";
+  const double scale = json_of(scene / "scene_info.json").at("scale");
+  EXPECT_GT(std::abs(scale - 1), 1e-6);
+  EXPECT_LT(std::abs(scale - 1), 0.005);
+  EXPECT_DOUBLE_EQ(json_of(scene / "scene_camera.json").at("0").at("scale_error").get<double>(), 0.001);
+  int bounded = 0;
+  for (const nlohmann::json& part : json_of(scene / "scene_gt_info.json").at("0")) bounded += part.contains("bound_mm");
+  EXPECT_GT(bounded, 0);
+}
 
 TEST_F(BinDataset, GoesOnWhereItWasBrokenOff) {
   options_.scenes = 2;

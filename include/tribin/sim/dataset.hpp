@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -12,20 +13,24 @@
 namespace tribin::sim {
 
 enum class SceneKind {
-  table,  ///< parts side by side, each in one of its stable rests
-  bin     ///< a heap that physics made
+  table,   ///< parts side by side, each in one of its stable rests
+  bin,     ///< a heap that physics made
+  empty,   ///< a bin as for such a heap, with nothing in it
+  foreign  ///< a bin with objects that are no parts, and no part
 };
 
-/// \throws Error bad_option for anything but table and bin.
+/// \throws Error bad_option for anything but table, bin, empty and foreign.
 SceneKind scene_kind_of(const std::string& name);
 
 struct DatasetOptions {
   std::vector<Mesh> parts;  ///< with their names; object k + 1 of the data set is parts[k]
   SceneKind kind = SceneKind::table;
   Level level = Level::easy;
-  int scenes = 1;          ///< >= 1
-  std::uint64_t seed = 1;  ///< scene i depends on parts, kind, level, seed and i alone
-  bool frames = false;     ///< also frames/: the pictures of a Gray code set with frames.json and rig.json, for `scan`
+  int scenes = 1;                    ///< >= 1
+  std::uint64_t seed = 1;            ///< scene i depends on parts, kind, level, seed and i alone
+  std::optional<double> systematic;  ///< largest relative error of depth over the image, in place of the level's
+  double scale_error = 0;            ///< sd of a relative depth error that a whole scene has in common
+  bool frames = false;  ///< also frames/: the pictures of a Gray code set with frames.json and rig.json, for `scan`
   std::function<void(int done, int scenes)> progress;  ///< called after each scene, by one thread at a time, if set
 };
 

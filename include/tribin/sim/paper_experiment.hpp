@@ -43,4 +43,12 @@ PaperScene paper_scene(const Mesh& part, int seed, const PaperOptions& options =
 /// \source information J^T J / sigma_z^2 with J = [n, (p - t) x n] / (n . ray): a pixel's depth against the pose.
 Matrix6 cramer_rao_bound(const SimulatedScan& simulated, int body, double correlation_px);
 
+/// A bound in two numbers, the norms of the standard deviations; 0 = not known.
+struct PoseBound {
+  double translation_mm = 0;  ///< of the point
+  double rotation = 0;        ///< [rad]
+};
+/// \param point  part frame: the centre of its box, mostly.
+PoseBound pose_bound(const Matrix6& covariance, const Pose& camera_from_part, const Vec3& point);
+
 }  // namespace tribin::sim

@@ -28,6 +28,7 @@ struct StructuredLight {
   double highlight = 0.5;               ///< 0 none .. 1: strength of mirror highlights, which saturate
   double mirror_share = 0;              ///< share of the light that shiny bodies throw on as clean mirrors, once
   double systematic = 0.0002;           ///< largest relative depth error, quadratic over the image
+  double scale = 1;                     ///< of all depths: 1 + an error that the whole image has in common
   double noise_mm = 0;                  ///< > 0: sd of z on a facing surface of albedo 0.5 at reference_mm, in place of
                                         ///< the one that image_noise gives
   double lost_share = 0;                ///< share of the pixels that are lost for no reason that is modelled, in blots
