@@ -57,6 +57,8 @@ TEST_F(BinDataset, HoldsNoPartWhereNoneIsWanted) {
 }
 
 TEST_F(BinDataset, TellsTheBoundOfEachPartAndTheScalesError) {
+  options_.parts = {foreign_objects(60).front()};  // a block: it has a bound where it leans and shows three faces
+  options_.level = Level::dense;
   options_.systematic = 0;
   options_.scale_error = 0.001;
   simulate_dataset(options_, folder("whole"));
