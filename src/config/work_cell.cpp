@@ -119,14 +119,6 @@ WorkCell read_work_cell(const std::filesystem::path& path) { return read_cell(pa
 
 WorkCell read_bin(const std::filesystem::path& path) { return read_cell(path, "bin"); }
 
-Pose base_from_camera(const WorkCell& cell, const std::optional<Pose>& base_from_flange) {
-  if (cell.mount() == CameraMount::fixed) return cell.hand_eye.parent_from_camera;
-  if (!base_from_flange)
-    io::bad_file(cell.file.string(), "camera.mount", "\"hand\", and no base_from_flange of the scan",
-                 "where the flange was when the scan was taken");
-  return *base_from_flange * cell.hand_eye.parent_from_camera;
-}
-
 std::string work_cell_keys() {
   return io::markdown_of(sections().rows()) + "\nA pose:\n\n" + io::markdown_of(config::pose_rows());
 }

@@ -157,6 +157,7 @@ Scan scan_from_cloud(RawCloud cloud, const ScanReadOptions& options) {
   Scan scan;
   scan.source = cloud.name;
   scan.warnings = cloud.warnings;
+  scan.taken = cloud.taken;
   const double scale = cloud_unit(cloud, options.unit, scan.warnings);
   Image<Vec3f> points;
   const std::size_t count = scaled(cloud, scale, points);
@@ -221,6 +222,7 @@ PointSet points_from_cloud(const RawCloud& cloud, const ScanReadOptions& options
   PointSet set;
   set.source = cloud.name;
   set.warnings = cloud.warnings;
+  set.taken = cloud.taken;
   const double scale = cloud_unit(cloud, options.unit, set.warnings);
   Vec3f low = Vec3f::Constant(std::numeric_limits<float>::infinity()), high = -low;
   set.points.reserve(cloud.points.size());

@@ -5,7 +5,7 @@
 #include <cstdio>
 #include <map>
 
-#include "io/json_fields.hpp"
+#include "io/pose_json.hpp"
 #include "tribin/kinematics/rotation_conventions.hpp"
 
 namespace tribin {
@@ -28,35 +28,6 @@ Vec3 point_at(const JsonPlace& entry, const char* key) {
   return {t[0], t[1], t[2]};
 }
 
-/// Printed digits leave a matrix a little off; more than 1e-3 is no rotation but another thing (a transposed shear,
-/// mm).
-Matrix3 rotation_matrix(const JsonPlace& place) {
-  constexpr const char* kWanted = "3 rows of 3 numbers, a rotation matrix";
-  Matrix3 r;
-  if (place.array_size(kWanted) != 3) place.fail(kWanted);
-  for (int row = 0; row < 3; ++row) {
-    const std::vector<double> numbers = place.at(static_cast<std::size_t>(row)).numbers(3, kWanted);
-    r.row(row) << numbers[0], numbers[1], numbers[2];
-  }
-  if (!((r * r.transpose() - Matrix3::Identity()).cwiseAbs().maxCoeff() < 1e-3) || r.determinant() < 0)
-    place.fail("a rotation matrix: rows of length 1 at right angles, right-handed");
-  return Eigen::Quaterniond(Eigen::Matrix3d(r)).normalized().toRotationMatrix();
-}
-
-/// {"rotation" | "rotation_vector_rad", "translation_mm"}
-Pose matrix_pose(const JsonPlace& entry) {
-  Pose pose = Pose::Identity();
-  pose.translation() = point_at(entry, "translation_mm");
-  if (entry.has("rotation_vector_rad")) {
-    constexpr const char* kWanted = "3 numbers [rad]";
-    const std::vector<double> w = entry.at("rotation_vector_rad", kWanted).numbers(3, kWanted);
-    pose.linear() = rotation_from_vector({w[0], w[1], w[2]});
-  } else {
-    pose.linear() = rotation_matrix(entry.at("rotation", "\"rotation\" (3 x 3) or \"rotation_vector_rad\""));
-  }
-  return pose;
-}
-
 struct RobotFormat {
   std::optional<robot::Convention> convention;
   double unit = 1;  ///< of positions, over the convention's own
@@ -65,13 +36,7 @@ struct RobotFormat {
 RobotFormat robot_format(const JsonPlace& top) {
   RobotFormat out;
   if (top.has("convention")) {
-    const JsonPlace place = top.at("convention", "");
-    std::string names;
-    for (robot::Convention c : robot::kConventions) {
-      names += (names.empty() ? "" : ", ") + std::string(robot::name_of(c));
-      if (place.value() == std::string(robot::name_of(c))) out.convention = c;
-    }
-    if (!out.convention) place.fail("one of " + names);
+    out.convention = io::convention_of(top.at("convention", ""));
   }
   if (top.has("robot_unit")) {
     const JsonPlace place = top.at("robot_unit", "");
@@ -84,30 +49,17 @@ RobotFormat robot_format(const JsonPlace& top) {
 
 Pose robot_pose(const JsonPlace& entry, const RobotFormat& format) {
   entry.only_keys({"id", "pose", "rotation", "rotation_vector_rad", "translation_mm"});
-  if (!entry.has("pose")) return matrix_pose(entry);
+  if (!entry.has("pose")) return io::pose_of(entry);
   if (!format.convention)
     entry.at("pose", "").fail("\"convention\" at the top level, which says what these numbers mean");
-  const int turns = robot::rotation_numbers(*format.convention);
-  const std::string name(robot::name_of(*format.convention));
-  const JsonPlace place = entry.at("pose", "");
-  const std::vector<double> numbers =
-      place.numbers(3 + turns, std::to_string(3 + turns) + " numbers: x, y, z, then the " + std::to_string(turns) +
-                                   " of its rotation (" + name + ")");
-  if (turns == 4) {
-    const double norm = std::hypot(std::hypot(numbers[3], numbers[4]), std::hypot(numbers[5], numbers[6]));
-    if (!(std::abs(norm - 1) < 1e-2)) place.fail("a quaternion of length 1");  // two printed digits
-  }
-  if (format.convention == robot::Convention::ur &&
-      !(std::hypot(numbers[3], numbers[4], numbers[5]) <= 4 * kPi))  // the controller keeps it below 2 pi
-    place.fail("a rotation vector in radians");
-  Pose pose = robot::pose_from_numbers(*format.convention, numbers);
+  Pose pose = io::robot_pose_of(entry.at("pose", ""), *format.convention);
   pose.translation() *= format.unit;
   return pose;
 }
 
 Pose camera_pose(const JsonPlace& entry, HandEyeTarget target) {
   entry.only_keys({"id", "rotation", "rotation_vector_rad", "translation_mm", "center_mm"});
-  if (target == HandEyeTarget::board) return matrix_pose(entry);
+  if (target == HandEyeTarget::board) return io::pose_of(entry);
   Pose pose = Pose::Identity();
   pose.translation() = point_at(entry, "center_mm");
   return pose;

@@ -102,9 +102,22 @@ RawArray parse_npy(const FileBytes& file) {
   return array;
 }
 
+std::string encode_npy(const RawArray& array) {
+  std::string shape = std::to_string(array.height) + ", " + std::to_string(array.width);
+  if (array.channels > 1) shape += ", " + std::to_string(array.channels);
+  std::string header = "{'descr': '<f4', 'fortran_order': False, 'shape': (" + shape + "), }";
+  constexpr std::size_t kBefore = 10, kAligned = 64;  // magic, version and length; the data begin at a multiple of 64
+  header.append(kAligned - (kBefore + header.size() + 1) % kAligned, ' ').append("\n");
+  std::string out("\x93NUMPY\x01\x00", 8);
+  append(out, static_cast<std::uint16_t>(header.size()));
+  out += header;
+  for (const float value : array.values) append(out, value);
+  return out;
+}
+
 RawCloud cloud_from_array(const FileBytes& file, RawArray array) {
   RawCloud cloud{
-      .name = file.name, .width = array.width, .height = array.height, .points = {}, .viewpoint = {}, .warnings = {}};
+      .name = file.name, .width = array.width, .height = array.height, .points = {}, .viewpoint = {}, .taken = {}, .warnings = {}};
   cloud.points.resize(array.values.size() / 3);
   for (std::size_t i = 0; i < cloud.points.size(); ++i) {
     cloud.points[i] = Vec3f(array.values[3 * i], array.values[3 * i + 1], array.values[3 * i + 2]);

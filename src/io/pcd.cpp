@@ -240,6 +240,7 @@ RawCloud parse_pcd(const FileBytes& file) {
                  .height = static_cast<int>(header.height),
                  .points = {},
                  .viewpoint = header.viewpoint,
+                 .taken = {},
                  .warnings = {}};
   const auto columns = columns_of(file, header, header.data == "binary_compressed");
   const std::size_t left = file.size() - header.body,

@@ -11,6 +11,7 @@ RawCloud parse_ply_cloud(const FileBytes& file) {
                  .height = content.height,
                  .points = {},
                  .viewpoint = {},
+                 .taken = {},
                  .warnings = {}};
   if (content.width == 0) {
     cloud.width = static_cast<int>(content.points.size());

@@ -16,6 +16,7 @@ struct RawCloud {
   int height = 1;                 ///< 1: loose points
   std::vector<Vec3f> points;      ///< width * height, row by row
   std::optional<Pose> viewpoint;  ///< of the PCD header: where the camera stood, in the file's unit
+  Taken taken;
   std::vector<std::string> warnings;
 
   bool organized() const { return width > 1 && height > 1; }
@@ -36,6 +37,8 @@ struct RawArray {
   std::vector<float> values;  ///< row by row, channels side by side
 };
 RawArray parse_npy(const FileBytes& file);
+/// H x W or H x W x channels, 4-byte floats.
+std::string encode_npy(const RawArray& array);
 
 /// Without libtiff: \throws Error bad_option that names the package.
 RawArray parse_tiff(const FileBytes& file);

@@ -6,6 +6,7 @@
 #include "io/depth_image.hpp"
 #include "io/png.hpp"
 #include "io/raw_cloud.hpp"
+#include "io/taken.hpp"
 
 namespace tribin {
 namespace {
@@ -28,15 +29,8 @@ Content content_of_array(const std::filesystem::path& path, const FileBytes& fil
   return io::scan_from_floats(file.name, std::move(depth), camera, options.unit);
 }
 
-Content read_content(const std::filesystem::path& path, const ScanReadOptions& options) {
-  const std::string extension = io::lower_extension(path);
-  const auto known = scan_extensions();
-  if (std::find(known.begin(), known.end(), extension) == known.end()) {
-    std::string list;
-    for (const std::string& e : known) list += (list.empty() ? "" : " ") + e;
-    io::bad_file(path.string(), "", "extension " + io::in_quotes(extension), "a scan (" + list + ")");
-  }
-  const FileBytes file = io::read_file(path);
+Content content_of(const std::filesystem::path& path, const std::string& extension, const FileBytes& file,
+                   const ScanReadOptions& options) {
   if (extension == ".png") {
     const auto steps = io::decode_png16(file);  // before the camera is looked for: it may not be a depth image at all
     return io::scan_from_steps(file.name, steps, io::camera_of_image(path, options));
@@ -46,6 +40,20 @@ Content read_content(const std::filesystem::path& path, const ScanReadOptions& o
   if (extension == ".npy") return content_of_array(path, file, io::parse_npy(file), options);
   if (extension == ".tif" || extension == ".tiff") return content_of_array(path, file, io::parse_tiff(file), options);
   return io::parse_xyz(file);
+}
+
+Content read_content(const std::filesystem::path& path, const ScanReadOptions& options) {
+  const std::string extension = io::lower_extension(path);
+  const auto known = scan_extensions();
+  if (std::find(known.begin(), known.end(), extension) == known.end()) {
+    std::string list;
+    for (const std::string& e : known) list += (list.empty() ? "" : " ") + e;
+    io::bad_file(path.string(), "", "extension " + io::in_quotes(extension), "a scan (" + list + ")");
+  }
+  const FileBytes file = io::read_file(path);
+  Content content = content_of(path, extension, file, options);
+  std::visit([&](auto& c) { io::read_taken(path, file.view(), c.taken, c.warnings); }, content);
+  return content;
 }
 
 }  // namespace
@@ -64,7 +72,8 @@ PointSet read_points(const std::filesystem::path& path, const ScanReadOptions& o
   Content content = read_content(path, options);
   if (auto* cloud = std::get_if<RawCloud>(&content)) return io::points_from_cloud(*cloud, options);
   const Scan& scan = std::get<Scan>(content);
-  PointSet set{.points = {}, .viewpoint = Vec3::Zero(), .source = scan.source, .warnings = scan.warnings};
+  PointSet set{
+      .points = {}, .viewpoint = Vec3::Zero(), .taken = scan.taken, .source = scan.source, .warnings = scan.warnings};
   for (int v = 0; v < scan.height(); ++v) {
     for (int u = 0; u < scan.width(); ++u) {
       if (std::isfinite(scan.z_mm(u, v))) set.points.push_back(Vec3f(scan.point(u, v).cast<float>()));

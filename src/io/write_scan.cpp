@@ -2,10 +2,10 @@
 #include <cmath>
 #include <limits>
 
-#include "io/atomic_file.hpp"
 #include "io/binary.hpp"
 #include "io/file_bytes.hpp"
 #include "io/png.hpp"
+#include "io/taken.hpp"
 #include "tribin/io/camera_file.hpp"
 #include "tribin/io/write.hpp"
 
@@ -82,7 +82,7 @@ void write_depth_image(const std::filesystem::path& path, const Scan& scan) {
     const float z = scan.z_mm.data[i];
     if (std::isfinite(z)) steps.data[i] = static_cast<std::uint16_t>(std::max(1.0, std::round(z / step)));
   }
-  io::write_file(path, io::encode_png16(steps));
+  io::write_scan_file(path, scan.taken, io::encode_png16(steps));
   std::filesystem::path camera = path;
   camera.replace_extension(".camera.json");
   write_camera_file(camera, {.camera = scan.camera, .depth_scale_mm = step, .distortion = {}, .noise = scan.noise});
@@ -101,20 +101,21 @@ void write_scan(const std::filesystem::path& path, const Scan& scan) {
   const std::string extension = io::lower_extension(path);
   if (extension == ".png") return write_depth_image(path, scan);
   // The camera's place is not written: the readers find it from the grid itself, exactly.
-  if (extension == ".ply") return io::write_file(path, ply_of(grid_of(scan), scan.width(), scan.height()));
+  if (extension == ".ply")
+    return io::write_scan_file(path, scan.taken, ply_of(grid_of(scan), scan.width(), scan.height()));
   if (extension == ".pcd")
-    return io::write_file(path, pcd_of(grid_of(scan), scan.width(), scan.height(), Vec3::Zero()));
-  if (extension == ".xyz") return io::write_file(path, xyz_of(grid_of(scan)));
+    return io::write_scan_file(path, scan.taken, pcd_of(grid_of(scan), scan.width(), scan.height(), Vec3::Zero()));
+  if (extension == ".xyz") return io::write_scan_file(path, scan.taken, xyz_of(grid_of(scan)));
   unknown(path, "a scan to write (.ply .pcd .xyz .png)");
 }
 
 void write_points(const std::filesystem::path& path, const PointSet& set) {
   const std::string extension = io::lower_extension(path);
   const int count = static_cast<int>(set.points.size());
-  if (extension == ".ply") return io::write_file(path, ply_of(set.points, count, 1));
+  if (extension == ".ply") return io::write_scan_file(path, set.taken, ply_of(set.points, count, 1));
   if (extension == ".pcd")
-    return io::write_file(path, pcd_of(set.points, count, 1, set.viewpoint.value_or(Vec3::Zero())));
-  if (extension == ".xyz") return io::write_file(path, xyz_of(set.points));
+    return io::write_scan_file(path, set.taken, pcd_of(set.points, count, 1, set.viewpoint.value_or(Vec3::Zero())));
+  if (extension == ".xyz") return io::write_scan_file(path, set.taken, xyz_of(set.points));
   unknown(path, "loose points to write (.ply .pcd .xyz)");
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -8,6 +9,7 @@
 
 #include "tribin/capture/hand_eye.hpp"
 #include "tribin/core/geometry.hpp"
+#include "tribin/scan/scan.hpp"
 
 /// What stands where in a work cell: plain descriptions, read from TOML and checked. Millimetres and radians here; the
 /// file's keys name their own units. docs/work_cell.md lists every key.
@@ -142,6 +144,15 @@ WorkCell read_bin(const std::filesystem::path& path);
 /// Where the camera was. \param base_from_flange  of the scan; needed by a camera on the flange.
 /// \throws Error bad_input where it is needed and missing.
 Pose base_from_camera(const WorkCell& cell, const std::optional<Pose>& base_from_flange = {});
+
+/// The same for a scan, as its file tells it (tribin/io/taken_file.hpp). A scan of a camera on the flange is refused
+/// where the pose or a time is missing (bad_input), and where the pose is older than the scan (out_of_range): the robot
+/// may have moved in between.
+/// \param scan    its name, for the message.
+/// \param now_ms  UTC; given where motion goes by the scan: then one older than safety.scan_max_age_s, or from the
+///                future, is refused (out_of_range), whatever the mount.
+Pose base_from_camera(const WorkCell& cell, const Taken& taken, const std::string& scan,
+                      std::optional<std::int64_t> now_ms = {});
 
 /// The table of all keys, as docs/work_cell.md shows it: key, unit, range, default, meaning. Markdown.
 std::string work_cell_keys();

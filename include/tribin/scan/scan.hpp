@@ -38,6 +38,16 @@ inline constexpr int kInvalidReasons = 11;
 /// The enumerator's own name.
 std::string_view name_of(Invalid reason);
 
+/// When and from where a scan was taken: what a camera on a robot's flange needs. Times are milliseconds since 1970,
+/// UTC.
+struct Taken {
+  std::optional<std::int64_t> time_ms;         ///< when the first picture of the scan was begun
+  std::optional<Pose> base_from_flange;        ///< of the flange that holds the camera
+  std::optional<std::int64_t> flange_time_ms;  ///< when the robot told that pose
+
+  bool known() const { return time_ms || base_from_flange; }
+};
+
 /// An organized depth scan: z along the optical axis of an ideal pinhole. x and y are never stored.
 struct Scan {
   Image<float> z_mm;  ///< H x W, NaN = no measurement
@@ -47,7 +57,8 @@ struct Scan {
   Image<std::uint8_t> invalid_reason;  ///< H x W of Invalid; empty if not known
   Image<Vec3f> rays;                   ///< only where the grid is no pinhole: ray with z = 1 of each pixel; else empty
   Pose input_from_camera = Pose::Identity();  ///< the file's own frame; results are given in it
-  std::string source;                         ///< file name, for messages
+  Taken taken;
+  std::string source;  ///< file name, for messages
   std::vector<std::string> warnings;
 
   int width() const { return z_mm.width; }
@@ -65,6 +76,7 @@ std::size_t valid_count(const Scan& scan);
 struct PointSet {
   std::vector<Vec3f> points;      ///< mm, in the file's frame; no NaN
   std::optional<Vec3> viewpoint;  ///< where the camera stood; none = normals stay unsigned
+  Taken taken;
   std::string source;
   std::vector<std::string> warnings;
 };
