@@ -36,6 +36,9 @@ void add_calibrate_projector(CLI::App& group, Context& context);
 void add_calibrate_rig(CLI::App& group, Context& context);
 void add_calibrate_hand_eye(CLI::App& group, Context& context);
 void add_calibrate_touch(CLI::App& group, Context& context);
+void add_bop(CLI::App& app, Context& context);
+void add_merge(CLI::App& app, Context& context);
+void add_eval(CLI::App& app, Context& context);
 void add_bench(CLI::App& app, Context& context);
 
 // Shared by the commands (inputs.cpp).

@@ -1,9 +1,6 @@
 #include <algorithm>
-#include <cstdio>
-#include <fstream>
-#include <nlohmann/json.hpp>
 
-#include "tribin/core/error.hpp"
+#include "eval/bop_files.hpp"
 #include "tribin/eval/eval.hpp"
 #include "tribin/io/cad_files.hpp"
 
@@ -11,17 +8,6 @@ namespace tribin::eval {
 namespace {
 
 using Json = nlohmann::json;
-
-Json read_json(const std::filesystem::path& path) {
-  std::ifstream file(path);
-  if (!file)
-    throw Error(ErrorCode::bad_input, path.string() + ": cannot be opened; wanted a JSON file of a BOP data set");
-  try {
-    return Json::parse(file);
-  } catch (const Json::exception& e) {
-    throw Error(ErrorCode::bad_input, path.string() + ": not JSON: " + e.what());
-  }
-}
 
 Pose pose_of(const Json& rotation, const Json& translation) {
   Pose out = Pose::Identity();
@@ -44,26 +30,18 @@ Vec3 vector_of(const Json& values) {
   return {values.at(0).get<double>(), values.at(1).get<double>(), values.at(2).get<double>()};
 }
 
-std::string object_file_stem(int id) {
-  char name[32];
-  std::snprintf(name, sizeof name, "obj_%06d", id);
-  return name;
-}
-
-std::string name_in(const Json& info, int id) { return info.value("name", object_file_stem(id)); }
-
 }  // namespace
 
 std::vector<Model> read_bop_models(const std::filesystem::path& models_dir) {
   const std::filesystem::path info_path = models_dir / "models_info.json";
-  const Json infos = read_json(info_path);
+  const Json infos = read_bop_json(info_path);
   std::vector<std::pair<int, Model>> models;
   try {
     for (const auto& [key, info] : infos.items()) {
       const int id = std::stoi(key);
       Model model;
-      model.name = name_in(info, id);
-      model.vertices = read_cad(models_dir / (object_file_stem(id) + ".ply")).vertices;
+      model.name = bop_object_name(info, id);
+      model.vertices = read_cad(models_dir / (bop_object_stem(id) + ".ply")).vertices;
       model.diameter_mm = info.at("diameter");
       const Vec3 low(info.at("min_x"), info.at("min_y"), info.at("min_z"));
       model.box_center = low + 0.5 * Vec3(info.at("size_x"), info.at("size_y"), info.at("size_z"));
@@ -88,10 +66,10 @@ std::vector<Model> read_bop_models(const std::filesystem::path& models_dir) {
 
 std::vector<Truth> read_bop_truth(const std::filesystem::path& scene_gt, int image,
                                   const std::filesystem::path& models_dir) {
-  const Json truths = read_json(scene_gt);
-  const Json infos = read_json(models_dir / "models_info.json");
+  const Json truths = read_bop_json(scene_gt);
+  const Json infos = read_bop_json(models_dir / "models_info.json");
   const std::filesystem::path visible_path = scene_gt.parent_path() / "scene_gt_info.json";
-  const Json visible = std::filesystem::exists(visible_path) ? read_json(visible_path) : Json::object();
+  const Json visible = std::filesystem::exists(visible_path) ? read_bop_json(visible_path) : Json::object();
   const std::string key = std::to_string(image);
   std::vector<Truth> out;
   try {
@@ -100,7 +78,7 @@ std::vector<Truth> read_bop_truth(const std::filesystem::path& scene_gt, int ima
       const Json& entry = truths[key][i];
       const int id = entry.at("obj_id");
       Truth truth;
-      truth.part = name_in(infos.at(std::to_string(id)), id);
+      truth.part = bop_object_name(infos.at(std::to_string(id)), id);
       truth.camera_from_part = pose_of(entry.at("cam_R_m2c"), entry.at("cam_t_m2c"));
       if (visible.contains(key)) truth.visible_fraction = visible[key].at(i).at("visib_fract");
       out.push_back(truth);
