@@ -136,9 +136,7 @@ std::string record_of(const eval::BopTask& task, const std::vector<eval::BopObje
   Found found;
   try {
     scan = read_scan(task.depth, {.camera_file = task.camera, .image_id = task.image});
-    found = find_parts(
-        scan, offered.of(task),
-        {.method = options.method == "paper" ? Method::paper : Method::surfel, .time_limit_ms = options.time_limit_ms});
+    found = find_parts(scan, offered.of(task), finder);
   } catch (const Error& e) {
     if (e.code() != ErrorCode::too_little_data && e.code() != ErrorCode::out_of_range) throw;
     log(LogLevel::warning,
