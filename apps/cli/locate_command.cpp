@@ -44,13 +44,15 @@ ReportTruth read_truth(const Options& options) {
 void print_table(const Scan& scan, std::span<const Part> parts, const Found& found,
                  const std::optional<ReportTruth>& truth) {
   std::printf("%s.\n", verdict(found, parts).c_str());
-  if (!found.instances.items.empty())
+  if (!found.instances.items.empty() || !found.instances.uncertain.empty())
     std::printf("%-20s %5s %7s %10s %10s %10s %9s %9s %9s %8s %8s%s\n", "part", "score", "visible", "x mm", "y mm",
                 "z mm", "Rx deg", "Ry deg", "Rz deg", "sd mm", "sd deg", truth ? " error mm  error deg" : "");
   std::optional<eval::Judgement> judged;
   if (truth) judged = eval::judge(found.instances.items, truth->truths, truth->models);
-  for (std::size_t i = 0; i < found.instances.items.size(); ++i) {
-    const Instance& instance = found.instances.items[i];
+  std::vector<Instance> rows = found.instances.items;
+  rows.insert(rows.end(), found.instances.uncertain.begin(), found.instances.uncertain.end());
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const Instance& instance = rows[i];
     const Pose pose = scan.input_from_camera * instance.camera_from_part;
     const Vec3 t = pose.translation(), r = yaskawa_angles(Matrix3(pose.linear())) / kDegree;
     const auto part = std::find_if(parts.begin(), parts.end(), [&](const Part& p) { return p.name == instance.part; });
@@ -58,7 +60,9 @@ void print_table(const Scan& scan, std::span<const Part> parts, const Found& fou
     std::printf("%-20s %5.3f %5.0f %% %10.3f %10.3f %10.3f %9.3f %9.3f %9.3f %8.4f %8.4f", instance.part.c_str(),
                 instance.score, 100 * instance.visible_fraction, t.x(), t.y(), t.z(), r.x(), r.y(), r.z(),
                 sigma.translation_mm, sigma.rotation / kDegree);
-    if (judged) {
+    if (i >= found.instances.items.size()) {
+      std::printf("    not given out");
+    } else if (judged) {
       const auto match = std::find_if(judged->found.begin(), judged->found.end(),
                                       [&](const eval::Match& m) { return m.answer == static_cast<int>(i); });
       if (match != judged->found.end())

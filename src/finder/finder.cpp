@@ -97,7 +97,7 @@ Found find_parts(const Scan& scan, std::span<const Part> parts, const FinderOpti
   else if (!found.instances.items.empty())
     found.status = "ok";
   else
-    found.status = found.instances.unexplained ? "not_empty_no_object" : "empty";
+    found.status = found.instances.unexplained || !found.instances.uncertain.empty() ? "not_empty_no_object" : "empty";
   return found;
 }
 

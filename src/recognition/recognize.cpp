@@ -19,6 +19,10 @@ constexpr double kOverlap = 0.3;
 // A place and class less likely than this is kept back: a robot that trusts it would miss twice in five picks.
 constexpr double kSureEnough = 0.6;
 
+// Given out is what is more likely right than wrong, in full pose; a place that is sure but not which of its
+// self-similar poses is told apart from them.
+constexpr double kGivenOut = 0.5;
+
 double overlap(const CellMask& a, const CellMask& b) {
   const int smaller = std::min(a.count, b.count);
   return smaller > 0 ? double(a.shared(b)) / smaller : 0;
@@ -136,8 +140,10 @@ struct Refused {
 };
 
 /// Best first: each place of the scan goes to the pose, of any part, that explains it best.
+/// \param claimed  cells that answers explain, of earlier rounds too; grows.
 std::vector<Polished> choose(const SceneDepth& scene, std::span<const Part> parts,
-                             std::vector<PoseCandidate> candidates, Refused& refused, std::vector<Reason>& rejected) {
+                             std::vector<PoseCandidate> candidates, CellMask& claimed, Refused& refused,
+                             std::vector<Reason>& rejected) {
   std::erase_if(candidates, [&](const PoseCandidate& c) { return refused.holds(parts, c); });
   std::stable_sort(candidates.begin(), candidates.end(), [](const PoseCandidate& a, const PoseCandidate& b) {
     return a.verification.gain > b.verification.gain;
@@ -149,7 +155,6 @@ std::vector<Polished> choose(const SceneDepth& scene, std::span<const Part> part
   });
   std::vector<Polished> winners;
   std::vector<bool> done(candidates.size(), false);
-  CellMask claimed;
   for (std::size_t i = 0; i < candidates.size(); ++i) {
     if (done[i]) continue;
     if (candidates[i].verification.gain <= 0) break;  // more speaks against it and all that follow than for them
@@ -231,6 +236,7 @@ Instances recognize(const Primitives& primitives, const PrimitiveModel& observat
            std::chrono::steady_clock::now() - start > std::chrono::milliseconds(options.time_limit_ms);
   };
   Refused refused;
+  CellMask claimed;
   // Rounds on what is left: primitives first, as long as they lead to parts; then pairs of points.
   for (const Source source : {Source::primitives, Source::point_pairs}) {
     constexpr int kRounds = 8;  // each round takes at least one part of those that touch or hide each other
@@ -242,25 +248,37 @@ Instances recognize(const Primitives& primitives, const PrimitiveModel& observat
             find_candidates(features, scene, parts[i], static_cast<int>(i), source, out.rejected);
         candidates.insert(candidates.end(), found.begin(), found.end());
       }
-      const std::vector<Polished> winners = choose(scene, parts, std::move(candidates), refused, out.rejected);
+      const std::vector<Polished> winners = choose(scene, parts, std::move(candidates), claimed, refused, out.rejected);
       for (const Polished& w : winners) {
         Instance instance = make_instance(w, parts, scene, features, surfels.scan->noise, options);
         claim_cells(features, w.mask.bits);
         double main = 1;
         for (const Alternative& a : instance.alternatives) main -= a.probability;
-        // Which of its self-similar poses it is in may be open; that it is there may not.
-        if (const double sure = instance.score / main; sure < kSureEnough)
-          add_reason(out.rejected, {instance.part, "acceptance", "probability", sure, kSureEnough, 1,
+        const auto kept_back = [&](const char* test, double value, double limit) {
+          add_reason(out.rejected, {instance.part, "acceptance", test, value, limit, 1,
                                     place_of(parts[static_cast<std::size_t>(w.candidate.part)], w.candidate)});
-        else
+        };
+        if (const double sure = instance.score / main; sure < kSureEnough) {
+          kept_back("probability", sure, kSureEnough);
+        } else if (instance.score < kGivenOut) {
+          kept_back("self_similar", instance.score, kGivenOut);
+          out.uncertain.push_back(std::move(instance));
+        } else if (instance.p_within_tolerance && *instance.p_within_tolerance < kGivenOut) {
+          kept_back("tolerance", *instance.p_within_tolerance, kGivenOut);
+          out.uncertain.push_back(std::move(instance));
+        } else {
           out.items.push_back(std::move(instance));
+        }
       }
       if (winners.empty()) break;
     }
   }
-  std::stable_sort(out.items.begin(), out.items.end(),
-                   [](const Instance& a, const Instance& b) { return a.score > b.score; });
-  for (std::size_t i = 0; i < out.items.size(); ++i) out.items[i].id = static_cast<int>(i) + 1;
+  int id = 0;
+  for (std::vector<Instance>* list : {&out.items, &out.uncertain}) {
+    std::stable_sort(list->begin(), list->end(),
+                     [](const Instance& a, const Instance& b) { return a.score > b.score; });
+    for (Instance& instance : *list) instance.id = ++id;
+  }
   name_neighbours(parts, out);
   out.unexplained =
       std::any_of(parts.begin(), parts.end(), [&](const Part& p) { return !unexplained_surfels(features, p).empty(); });

@@ -94,6 +94,9 @@ std::string locate_json(const Scan& scan, const Found& found, const JsonOptions&
   out["instances"] = Json::array();
   for (const Instance& instance : found.instances.items)
     out["instances"].push_back(instance_json(instance, scan.input_from_camera));
+  out["uncertain"] = Json::array();
+  for (const Instance& instance : found.instances.uncertain)
+    out["uncertain"].push_back(instance_json(instance, scan.input_from_camera));
   out["rejected"] = Json::array();
   for (const Reason& reason : found.instances.rejected)
     out["rejected"].push_back(reason_json(reason, scan.input_from_camera));

@@ -47,6 +47,12 @@ std::string parts_named(std::span<const Part> parts) {
 
 std::string verdict(const Found& found, std::span<const Part> parts) {
   const auto& items = found.instances.items;
+  const std::size_t unsure = found.instances.uncertain.size();
+  const std::string rest = unsure == 0   ? ""
+                           : unsure == 1 ? "; 1 more stands in a place that is known, in a pose that is not settled"
+                                         : "; " + std::to_string(unsure) +
+                                               " more stand in places that are known, in poses that are not settled";
+  if (items.empty() && unsure > 0) return "No part is given out" + rest;
   if (items.empty()) {
     if (found.status == "empty") return "Nothing is there: no surface is left unexplained";
     if (found.status == "no_data") return "Too little data: see the warnings";
@@ -62,7 +68,7 @@ std::string verdict(const Found& found, std::span<const Part> parts) {
     if (count > 1) words.push_back(std::to_string(count) + " " + part.name);
   }
   const std::string head = items.size() == 1 ? "1 part found: " : std::to_string(items.size()) + " parts found: ";
-  return head + joined(words);
+  return head + joined(words) + rest;
 }
 
 }  // namespace tribin

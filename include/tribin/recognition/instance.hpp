@@ -66,6 +66,9 @@ struct Instance {
 
 struct Instances {
   std::vector<Instance> items;
+  /// Class and place are sure, but which of its self-similar poses it is in is less likely told than not, or the pose
+  /// is not as exact as was asked for. Same fields; `alternatives` holds the other poses.
+  std::vector<Instance> uncertain;
   std::vector<Reason> rejected;
   bool time_limit = false;   ///< the time ran out before all that is left was looked at
   bool unexplained = false;  ///< something of a part's size is left that neither a part nor a large surface explains
