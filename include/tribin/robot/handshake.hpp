@@ -1,0 +1,74 @@
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tribin/robot/controller.hpp"
+#include "tribin/robot/link.hpp"
+
+/// The vision hand-shake: pick and place are commands to a job on the controller, which keeps interlocks, speeds and
+/// the grip check. docs/robot.md has the variables; examples/robots/BPICK.JBI is the job.
+namespace tribin::robot {
+
+enum class CycleCommand { pick = 1, place = 2, put_back = 3, way_points = 4 };
+enum class CycleResult {
+  done = 1,  ///< held, or released
+  grip_missing = 2,
+  fault = 3,
+  part_lost = 4,  ///< on the way
+};
+
+/// One command to the job. A cycle number is never used for two commands in a row.
+struct CycleOrder {
+  CycleCommand command = CycleCommand::pick;
+  int cycle = 1;                             ///< 1..32767
+  int part_class = 0;                        ///< 0..255, for jobs of classes
+  std::vector<CartesianPosition> positions;  ///< 3: before, at, after; way points: 1 to 6
+};
+
+/// Which variables: arm 2 of a dual-arm robot has B010, I010 and P020 on.
+struct HandshakeVariables {
+  int bytes = 0, integers = 0, positions = 0;
+};
+
+enum class CycleState {
+  never_taken,  ///< the job knows nothing of the cycle
+  under_way,    ///< taken, or stopped inside
+  done,
+};
+/// What the controller says about a cycle; to be asked after any crash, before anything is sent.
+struct CycleRecord {
+  CycleState state = CycleState::never_taken;
+  std::optional<CycleResult> result;  ///< of one that is done
+};
+
+struct HandshakeOptions {
+  HandshakeVariables variables;
+  double poll_s = 0.1;   ///< of B001 and RSTATS while it runs
+  double take_s = 5;     ///< until the job has taken the command
+  double finish_s = 60;  ///< until it is done
+  double settle_s = 1;   ///< after an unknown outcome, before what may not have come is written again
+  int attempts = 10;     ///< of writing and of reconnecting
+  /// Asked at every poll; false puts the robot on hold and ends the cycle with an Error.
+  std::function<bool(const ControllerStatus&)> may_go_on;
+};
+
+/// Gives the job one command and waits until it is done. Every variable is read back before the command itself is
+/// written; where the outcome of that is unknown, the controller's acknowledgement decides, so that nothing moves
+/// twice. \throws ControllerError  refused: not remote, not in play, held, alarm, job not running; unknown_outcome:
+/// read the
+///                          record, and let a person decide where it is under way.
+CycleResult run_cycle(Controller& controller, Clock& clock, const CycleOrder& order,
+                      const HandshakeOptions& options = {});
+
+CycleRecord read_record(Controller& controller, Clock& clock, int cycle, const HandshakeOptions& options = {});
+
+/// Waits until a cycle that is under way is done.
+CycleResult finish_cycle(Controller& controller, Clock& clock, int cycle, const HandshakeOptions& options = {});
+
+/// 1..32767, then 1 again.
+int next_cycle(int cycle);
+
+}  // namespace tribin::robot

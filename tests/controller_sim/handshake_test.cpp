@@ -1,0 +1,150 @@
+#include <gtest/gtest.h>
+
+#include "support/handshake_campaign.hpp"
+#include "tribin/controller_sim/virtual_link.hpp"
+#include "tribin/robot/hses.hpp"
+#include "tribin/robot/nx100.hpp"
+
+namespace tribin {
+namespace {
+
+using namespace controller_sim;
+using robot::ControllerError;
+using robot::ControllerFault;
+using robot::CycleCommand;
+using robot::CycleResult;
+using robot::CycleState;
+
+/// A machine with the job running, a gripper that grips, and a client of either protocol.
+struct Cell {
+  explicit Cell(const std::string& protocol, FaultPlan plan = {}, bool grips = true)
+      : machine({.on_output =
+                     [grips](Machine& m, int output, bool on) {
+                       if (output == 1) m.set_input(1, on && grips);
+                     }}),
+        wire(machine, std::move(plan)) {
+    machine.add_job(parse_job(handshake_job(), "BPICK"));
+    machine.start("BPICK");
+    if (protocol == "nx100")
+      client = robot::make_nx100(virtual_stream(wire, clock), clock);
+    else
+      client = robot::make_hses(virtual_datagrams(wire, clock), clock);
+  }
+  Machine machine;
+  Wire wire;
+  VirtualClock clock;
+  std::unique_ptr<robot::Controller> client;
+  std::mt19937_64 random{1};
+};
+
+struct Handshake : testing::TestWithParam<const char*> {};
+
+TEST_P(Handshake, PicksAndPlaces) {
+  Cell cell(GetParam());
+  for (int cycle = 1; cycle <= 4; ++cycle) {
+    const auto order = test::random_order(cycle, cell.random);
+    EXPECT_EQ(read_record(*cell.client, cell.clock, cycle).state, CycleState::never_taken);
+    EXPECT_EQ(run_cycle(*cell.client, cell.clock, order), CycleResult::done);
+    EXPECT_EQ(read_record(*cell.client, cell.clock, cycle).state, CycleState::done);
+    EXPECT_EQ(cell.machine.bytes[2], order.part_class);
+  }
+  EXPECT_EQ(cell.machine.moves().size(), 12u);
+}
+
+TEST_P(Handshake, TellsThatNothingWasGrippedOrThatItWasLost) {
+  Cell empty(GetParam(), {}, false);
+  auto pick = test::random_order(1, empty.random);
+  EXPECT_EQ(run_cycle(*empty.client, empty.clock, pick), CycleResult::grip_missing);
+  EXPECT_FALSE(empty.machine.output(1));  // opened again
+
+  Cell cell(GetParam());
+  EXPECT_EQ(run_cycle(*cell.client, cell.clock, pick), CycleResult::done);
+  cell.machine.set_input(1, false);
+  EXPECT_EQ(run_cycle(*cell.client, cell.clock, test::random_order(2, cell.random)), CycleResult::part_lost);
+}
+
+TEST_P(Handshake, PutsBackAndGoesAlongWayPoints) {
+  Cell cell(GetParam());
+  auto order = test::random_order(1, cell.random);
+  EXPECT_EQ(run_cycle(*cell.client, cell.clock, order), CycleResult::done);
+  order.command = CycleCommand::put_back;
+  order.cycle = 2;
+  EXPECT_EQ(run_cycle(*cell.client, cell.clock, order), CycleResult::done);
+  EXPECT_FALSE(cell.machine.output(1));
+  for (int count = 1; count <= 6; ++count) {
+    cell.machine.forget_moves();
+    order.command = CycleCommand::way_points;
+    order.cycle = 2 + count;
+    order.positions.assign(static_cast<std::size_t>(count), order.positions.front());
+    for (int i = 0; i < count; ++i) order.positions[static_cast<std::size_t>(i)].numbers[0] += 10 * i;
+    EXPECT_EQ(run_cycle(*cell.client, cell.clock, order), CycleResult::done);
+    EXPECT_EQ(static_cast<int>(cell.machine.moves().size()), count);
+    EXPECT_NEAR(cell.machine.position().numbers[0], order.positions.back().numbers[0], 1e-6);
+  }
+}
+
+TEST_P(Handshake, NeverSendsACycleTwice) {
+  Cell cell(GetParam());
+  const auto order = test::random_order(1, cell.random);
+  EXPECT_EQ(run_cycle(*cell.client, cell.clock, order), CycleResult::done);
+  try {
+    run_cycle(*cell.client, cell.clock, order);
+    FAIL();
+  } catch (const ControllerError& error) {
+    EXPECT_EQ(error.fault(), ControllerFault::not_sent);
+  }
+  EXPECT_EQ(cell.machine.moves().size(), 3u);
+  // A command of before that comes late: the job itself refuses the number.
+  cell.machine.bytes[0] = 1;
+  for (double t = 0; t < 10; t += 0.1) cell.machine.advance(cell.clock.now_s() + t);
+  EXPECT_EQ(cell.machine.moves().size(), 3u);
+  EXPECT_EQ(cell.machine.bytes[0], 0);
+}
+
+TEST_P(Handshake, StopsWithAReasonWhereTheMachineCannot) {
+  Cell cell(GetParam());
+  cell.machine.hold(true);
+  EXPECT_THROW(run_cycle(*cell.client, cell.clock, test::random_order(1, cell.random)), ControllerError);
+  cell.machine.hold(false);
+  cell.machine.start("");
+  robot::HandshakeOptions options;
+  options.may_go_on = [](const robot::ControllerStatus&) { return false; };
+  EXPECT_THROW(run_cycle(*cell.client, cell.clock, test::random_order(1, cell.random), options), ControllerError);
+  EXPECT_TRUE(cell.machine.status().held_by_command);
+  EXPECT_TRUE(cell.machine.moves().empty());
+}
+
+TEST_P(Handshake, AfterACrashTheRecordTellsWhatWas) {
+  Cell cell(GetParam());
+  const auto order = test::random_order(1, cell.random);
+  int polls = 0;
+  robot::HandshakeOptions options;
+  options.may_go_on = [&polls](const robot::ControllerStatus&) -> bool {
+    if (++polls > 6) throw std::runtime_error("kill -9");
+    return true;
+  };
+  EXPECT_THROW(run_cycle(*cell.client, cell.clock, order, options), std::runtime_error);
+  EXPECT_EQ(read_record(*cell.client, cell.clock, 1).state, CycleState::under_way);
+  EXPECT_EQ(finish_cycle(*cell.client, cell.clock, 1), CycleResult::done);
+  EXPECT_EQ(cell.machine.moves().size(), 3u);
+}
+
+TEST_P(Handshake, SurvivesRandomFaultsWithoutADoubleMotion) {
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    SCOPED_TRACE(seed);
+    Cell cell(GetParam(), test::all_faults(0.03 * static_cast<double>(seed), seed));
+    const auto counts = test::run_handshakes(
+        *cell.client, cell.clock, cell.machine, 100, seed, [](auto&& work) { work(); }, /*trouble_rate=*/0.1);
+    EXPECT_EQ(counts.double_motions, 0);
+    EXPECT_EQ(counts.missing_motions, 0);
+    EXPECT_EQ(counts.wrong_positions, 0);
+    EXPECT_EQ(counts.hangs, 0);
+    EXPECT_GT(counts.done, 90);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Protocols, Handshake, testing::Values("nx100", "hses"),
+                         [](const auto& info) { return info.param; });
+
+}  // namespace
+}  // namespace tribin
