@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <map>
+#include <vector>
+
+#include "raster.hpp"
 
 namespace tribin {
 namespace {
@@ -14,9 +16,13 @@ constexpr double kEdgeSigmaPx = 0.5;
 constexpr double kSampleWeight = 0.5;
 constexpr double kSteepest = 0.42;  // cos 65 deg
 
+/// Pixel nearest to a place right of -1. (std::lround is a call.)
+int nearest_pixel(double x) { return static_cast<int>(std::min(x, 1e6) + 1.5) - 1; }
+
 /// Is the scan at pixel (x, y) the plane n . p = rho, up to noise and a pixel's slope?
 bool on_surface(const SceneDepth& scene, double x, double y, const Eigen::Vector3d& n, double rho) {
-  const int u = static_cast<int>(std::lround(x)), v = static_cast<int>(std::lround(y));
+  if (!(x > -1 && y > -1)) return false;
+  const int u = nearest_pixel(x), v = nearest_pixel(y);
   if (!scene.z_mm.contains(u, v)) return false;
   const float z = scene.z_mm(u, v);
   if (!(z > 0)) return false;
@@ -29,21 +35,22 @@ bool on_surface(const SceneDepth& scene, double x, double y, const Eigen::Vector
 /// Signed place of the scan's edge along m from (x, y) [px], nearest to 0; NaN if there is none within reach.
 double edge_along(const SceneDepth& scene, double x, double y, const Vec2& m, const Eigen::Vector3d& n, double rho,
                   double reach) {
-  const int half = static_cast<int>(std::ceil(reach)) + 2;
-  std::array<bool, 64> on{};
-  const int count = std::min(2 * half + 1, static_cast<int>(on.size()));
-  for (int k = 0; k < count; ++k) {
-    const double s = k - half;
-    on[static_cast<std::size_t>(k)] = on_surface(scene, x + s * m[0], y + s * m[1], n, rho);
-  }
-  double best = std::nan("");
-  for (std::size_t k = 1; k + 2 < static_cast<std::size_t>(count); ++k) {
-    // Two on, two off: a single stray pixel is no edge.
-    if (!(on[k - 1] && on[k] && !on[k + 1] && !on[k + 2])) continue;
-    const double s = static_cast<double>(k) - half + 0.5;
-    if (std::abs(s) <= reach && !(std::abs(s) >= std::abs(best))) best = s;
-  }
-  return best;
+  // Places k - half along m, looked at when asked for: most edges lie near 0.
+  const int half = std::min(static_cast<int>(std::ceil(reach)) + 2, 31);
+  std::array<std::int8_t, 64> known{};
+  const auto on = [&](int k) {
+    std::int8_t& at = known[static_cast<std::size_t>(k)];
+    if (at == 0) at = on_surface(scene, x + (k - half) * m[0], y + (k - half) * m[1], n, rho) ? 1 : -1;
+    return at > 0;
+  };
+  for (int away = 0; away < half - 1; ++away)
+    for (const int k : {half - 1 - away, half + away}) {
+      const double s = k - half + 0.5;
+      if (k < 1 || k + 2 > 2 * half || std::abs(s) > reach) continue;
+      // Two on, two off: a single stray pixel is no edge.
+      if (on(k) && !on(k + 1) && on(k - 1) && !on(k + 2)) return s;
+    }
+  return std::nan("");
 }
 
 }  // namespace
@@ -54,11 +61,15 @@ ContourSums contour_sums(const RenderMesh& mesh, const SceneDepth& scene, const 
   if (render.width == 0) return out;
   const PinholeCamera& camera = scene.camera;
   const Eigen::Matrix3d rotation = camera_from_part.linear();
+  const double inverse_step = 1.0 / render.step;
   double squares = 0, weights = 0;
   Eigen::Matrix<double, 6, 6> h = Eigen::Matrix<double, 6, 6>::Zero();
   Eigen::Matrix<double, 6, 1> b = Eigen::Matrix<double, 6, 1>::Zero();
   const Vec3f eye = Vec3f((-(rotation.transpose() * camera_from_part.translation())).cast<float>());
-  const auto faces_camera = [&](std::int32_t t) { return t >= 0 && mesh.faces(static_cast<std::size_t>(t), eye); };
+  thread_local std::vector<float> side;
+  side.resize(mesh.triangles.size());
+  raster::sides_of_camera(mesh.normals.data()->data(), mesh.offsets.data(), side.size(), eye, side.data());
+  const auto faces_camera = [&](std::int32_t t) { return t >= 0 && side[static_cast<std::size_t>(t)] > 0; };
   for (const OutlineEdge& edge : mesh.edges) {
     const bool front0 = faces_camera(edge.triangles[0]), front1 = faces_camera(edge.triangles[1]);
     if (front0 == front1) continue;
@@ -92,10 +103,12 @@ ContourSums contour_sums(const RenderMesh& mesh, const SceneDepth& scene, const 
       const double z = 1 / w;
       // Seen there, and nothing of the part beyond?
       const auto rendered = [&](double s, float& inverse_z) {
-        const long i = std::lround((q[0] + s * m[0] - render.u0) / render.step);
-        const long j = std::lround((q[1] + s * m[1] - render.v0) / render.step);
-        if (i < 0 || j < 0 || i >= render.width || j >= render.height) return false;
-        const std::size_t at = render.index(static_cast<int>(i), static_cast<int>(j));
+        const double x = (q[0] + s * m[0] - render.u0) * inverse_step;
+        const double y = (q[1] + s * m[1] - render.v0) * inverse_step;
+        if (!(x > -0.5 && y > -0.5)) return false;
+        const int i = nearest_pixel(x), j = nearest_pixel(y);
+        if (i >= render.width || j >= render.height) return false;
+        const std::size_t at = render.index(i, j);
         inverse_z = render.inverse_z[at];
         return render.triangle[at] >= 0;
       };

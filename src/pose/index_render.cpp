@@ -5,9 +5,19 @@
 #include <cmath>
 #include <numeric>
 
+#include "move_render.hpp"
 #include "raster.hpp"
 
 namespace tribin {
+namespace {
+
+raster::Rays rays_of(const PinholeCamera& camera, const Matrix3& rotation, const IndexRender& render) {
+  const Vec3 origin((render.u0 - camera.cx) / camera.fx, (render.v0 - camera.cy) / camera.fy, 1);
+  const auto in_part = [&](const Vec3& ray) { return Vec3f((rotation.transpose() * ray).cast<float>()); };
+  return {in_part(origin), in_part(Vec3(render.step / camera.fx, 0, 0)), in_part(Vec3(0, render.step / camera.fy, 0))};
+}
+
+}  // namespace
 
 void render_index(const RenderMesh& mesh, const PinholeCamera& camera, const Pose& camera_from_part, int step,
                   IndexRender& render) {
@@ -83,10 +93,7 @@ void render_index(const RenderMesh& mesh, const PinholeCamera& camera, const Pos
     canvas.front[drawn] = canvas.front[f];
     drawn += static_cast<std::size_t>(canvas.hold[f]);
   }
-  const Vec3 origin((render.u0 - camera.cx) / camera.fx, (render.v0 - camera.cy) / camera.fy, 1);
-  const Rays rays{Vec3f((rd.transpose() * origin).cast<float>()),
-                  Vec3f((rd.transpose() * Vec3(step / camera.fx, 0, 0)).cast<float>()),
-                  Vec3f((rd.transpose() * Vec3(0, step / camera.fy, 0)).cast<float>())};
+  const Rays rays = rays_of(camera, rd, render);
   canvas.setup.resize(kSetup * drawn);
   gather(drawn);
   set_up(canvas.corners.data(), drawn, canvas.setup.data());
@@ -112,6 +119,32 @@ void render_index(const RenderMesh& mesh, const PinholeCamera& camera, const Pos
   }
   turn_normals(normals, canvas.side.data(), triangles, m.r, render.normal.data()->data());
   for (const std::int32_t k : render.triangle) render.silhouette_pixels += k >= 0;
+}
+
+void move_render(const RenderMesh& mesh, const PinholeCamera& camera, const Pose& camera_from_part,
+                 IndexRender& render) {
+  thread_local std::vector<float> side, depth;
+  const std::size_t triangles = mesh.triangles.size();
+  if (triangles == 0) return;
+  const Matrix3 rd = camera_from_part.linear();
+  float r[9];
+  for (int i = 0; i < 9; ++i) r[i] = static_cast<float>(rd(i / 3, i % 3));
+  const Vec3f eye = (-(rd.transpose() * camera_from_part.translation())).cast<float>();
+  side.resize(triangles);
+  depth.resize(3 * triangles);
+  const float* normals = mesh.normals.data()->data();
+  raster::sides_of_camera(normals, mesh.offsets.data(), triangles, eye, side.data());
+  raster::facet_depths(normals, side.data(), triangles, rays_of(camera, rd, render), depth.data());
+  raster::turn_normals(normals, side.data(), triangles, r, render.normal.data()->data());
+  for (int j = 0; j < render.height; ++j)
+    for (int i = 0; i < render.width; ++i) {
+      const std::size_t p = render.index(i, j);
+      if (render.triangle[p] < 0) continue;
+      const float* d = depth.data() + 3 * static_cast<std::ptrdiff_t>(render.triangle[p]);
+      const float w = d[0] * static_cast<float>(i) + d[1] * static_cast<float>(j) + d[2];
+      // Seen edge-on a facet's plane says nothing of where it is.
+      if (std::abs(w - render.inverse_z[p]) < 0.01f * render.inverse_z[p]) render.inverse_z[p] = w;
+    }
 }
 
 }  // namespace tribin

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 
+#include "move_render.hpp"
 #include "tribin/core/parallel.hpp"
 #include "tribin/pose/contour.hpp"
 
@@ -164,6 +165,12 @@ void add_outlines(Matrix6& information, Vector6& b, const ContourSums& edges, co
   b += edges.pull * share;
 }
 
+/// How far a motion carries the part's surface at most, nearly: its rim is two radii of gyration away [mm].
+double reach_of_motion(const Pose& a, const Pose& b, const RefineOptions& options) {
+  const Eigen::Vector3d c = options.center;
+  return (a * c - b * c).norm() + 2 * options.lever_mm * rotation_angle(a.linear(), b.linear());
+}
+
 }  // namespace
 
 Refinement refine_pose(const RenderMesh& mesh, const SceneDepth& scene, const Pose& start,
@@ -171,6 +178,7 @@ Refinement refine_pose(const RenderMesh& mesh, const SceneDepth& scene, const Po
   Refinement out;
   out.camera_from_part = start;
   thread_local IndexRender render;
+  Pose rendered_at = start;
   // The kernel ends at 3 local sigma (accumulate); the schedule falls below that everywhere.
   const double end_scale = 3 * std::hypot(0.3 * scene.median_sigma_mm, options.cad_sigma_mm);
   const double ratio =
@@ -182,7 +190,15 @@ Refinement refine_pose(const RenderMesh& mesh, const SceneDepth& scene, const Po
   for (int it = 0; it <= options.iterations; ++it) {
     const bool final_pass = it == options.iterations;
     const Eigen::Vector3d center = out.camera_from_part * Eigen::Vector3d(options.center);
-    render_index(mesh, scene.camera, out.camera_from_part, options.step_px, render);
+    // While the pose moves by less than a quarter of a rendered pixel, each pixel keeps its facet.
+    const double pixel_mm = options.step_px * center.z() / scene.camera.fx;
+    const double moved_mm = it == 0 ? 1e30 : reach_of_motion(rendered_at, out.camera_from_part, options);
+    if (moved_mm > 0.25 * pixel_mm) {
+      render_index(mesh, scene.camera, out.camera_from_part, options.step_px, render);
+      rendered_at = out.camera_from_part;
+    } else {
+      move_render(mesh, scene.camera, out.camera_from_part, render);
+    }
     const Sums sums = accumulate(scene, render, center, final_pass ? end_scale : std::max(scale, end_scale),
                                  options.cad_sigma_mm, kernel, final_pass);
     // Pixels nearer than the noise's correlation count once.
