@@ -65,6 +65,7 @@ int main(int argc, char** argv) {
   tribin::cli::add_calibrate(app, context);
   tribin::cli::add_bop(app, context);
   tribin::cli::add_merge(app, context);
+  tribin::cli::add_eval(app, context);
   tribin::cli::add_bench(app, context);
 
   constexpr int kBadOption = static_cast<int>(tribin::ErrorCode::bad_option);

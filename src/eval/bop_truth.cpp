@@ -9,6 +9,8 @@ namespace {
 
 using Json = nlohmann::json;
 
+constexpr int kSurfacePoints = 20000;  // 1 % of the diameter apart on a ball
+
 Pose pose_of(const Json& rotation, const Json& translation) {
   Pose out = Pose::Identity();
   for (int i = 0; i < 9; ++i) out.linear()(i / 3, i % 3) = rotation.at(i).get<double>();
@@ -41,7 +43,10 @@ std::vector<Model> read_bop_models(const std::filesystem::path& models_dir) {
       const int id = std::stoi(key);
       Model model;
       model.name = bop_object_name(info, id);
-      model.vertices = read_cad(models_dir / (bop_object_stem(id) + ".ply")).vertices;
+      const Mesh mesh = read_cad(models_dir / (bop_object_stem(id) + ".ply"));
+      model.id = id;
+      model.vertices = mesh.vertices;
+      model.surface = points_on(mesh, kSurfacePoints);
       model.diameter_mm = info.at("diameter");
       const Vec3 low(info.at("min_x"), info.at("min_y"), info.at("min_z"));
       model.box_center = low + 0.5 * Vec3(info.at("size_x"), info.at("size_y"), info.at("size_z"));
@@ -80,7 +85,12 @@ std::vector<Truth> read_bop_truth(const std::filesystem::path& scene_gt, int ima
       Truth truth;
       truth.part = bop_object_name(infos.at(std::to_string(id)), id);
       truth.camera_from_part = pose_of(entry.at("cam_R_m2c"), entry.at("cam_t_m2c"));
-      if (visible.contains(key)) truth.visible_fraction = visible[key].at(i).at("visib_fract");
+      if (visible.contains(key)) {
+        const Json& seen = visible[key].at(i);
+        truth.visible_fraction = seen.at("visib_fract");
+        truth.bound_mm = seen.value("bound_mm", 0.0);
+        truth.bound_rotation = seen.value("bound_deg", 0.0) * kDegree;
+      }
       out.push_back(truth);
     }
   } catch (const Json::exception& e) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "tribin/core/error.hpp"
 
@@ -111,12 +112,65 @@ Model model_of(const Part& part) {
   return out;
 }
 
+double overlap(const Model& model, const Pose& a, const Pose& b, double limit_mm) {
+  constexpr std::size_t kAsked = 400;  // points: a share of 0.5 is known to 0.05
+  const Pose from_b = a.inverse() * b;
+  const std::size_t asked = std::min(kAsked, model.surface.size());
+  std::size_t near = 0;
+  for (std::size_t i = 0; i < asked; ++i) {
+    const Vec3f p = (from_b * model.surface[i].cast<double>()).cast<float>();
+    const float limit = static_cast<float>(limit_mm * limit_mm);
+    near += std::any_of(model.surface.begin(), model.surface.end(),
+                        [&](const Vec3f& q) { return (p - q).squaredNorm() < limit; });
+  }
+  return asked > 0 ? static_cast<double>(near) / static_cast<double>(asked) : 0;
+}
+
+std::vector<Vec3f> points_on(const Mesh& mesh, int count) {
+  std::vector<double> area_before;
+  double area = 0;
+  for (const auto& t : mesh.triangles) {
+    const Vec3 a = mesh.vertices[t[0]].cast<double>(), b = mesh.vertices[t[1]].cast<double>(),
+               c = mesh.vertices[t[2]].cast<double>();
+    area_before.push_back(area);
+    area += 0.5 * (b - a).cross(c - a).norm();
+  }
+  if (!(area > 0)) return {};
+  const auto radical_inverse = [](unsigned base, unsigned i) {
+    double value = 0, digit = 1.0 / base;
+    for (; i > 0; i /= base, digit /= base) value += digit * (i % base);
+    return value;
+  };
+  std::vector<Vec3f> out;
+  for (unsigned i = 1; i <= static_cast<unsigned>(count); ++i) {
+    const auto after = std::upper_bound(area_before.begin(), area_before.end(), area * radical_inverse(2, i));
+    const auto& t = mesh.triangles[static_cast<std::size_t>(after - area_before.begin()) - 1];
+    const float root = static_cast<float>(std::sqrt(radical_inverse(3, i))),
+                v = static_cast<float>(radical_inverse(5, i));
+    out.push_back((1 - root) * mesh.vertices[t[0]] + root * (1 - v) * mesh.vertices[t[1]] +
+                  root * v * mesh.vertices[t[2]]);
+  }
+  return out;
+}
+
 Share share_of(int count, int of) {
   if (of <= 0) return {count, of, 0, 1};
   const double z = 1.959964, n = of, p = count / n;  // z: two-sided 95 %
   const double middle = (p + z * z / (2 * n)) / (1 + z * z / n);
   const double half = z / (1 + z * z / n) * std::sqrt(p * (1 - p) / n + z * z / (4 * n * n));
   return {count, of, std::max(0.0, middle - half), std::min(1.0, middle + half)};
+}
+
+Estimate quantile_estimate(const std::vector<double>& values, double q) {
+  std::vector<double> sorted = values;
+  std::sort(sorted.begin(), sorted.end());
+  const double n = static_cast<double>(sorted.size());
+  Estimate out{quantile(sorted, q), 0, std::numeric_limits<double>::infinity(), static_cast<int>(sorted.size())};
+  const double half = 1.959964 * std::sqrt(n * q * (1 - q));
+  const double low = std::floor(n * q - half) - 1, high = std::ceil(n * q + half);  // ranks from 0
+  if (low >= 0) out.low = sorted[static_cast<std::size_t>(low)];
+  if (high < n) out.high = sorted[static_cast<std::size_t>(high)];
+  return out;
 }
 
 double quantile(std::vector<double> values, double q) {

@@ -15,7 +15,9 @@ namespace tribin::eval {
 /// What judging needs of a part: its points and its true symmetries.
 struct Model {
   std::string name;
+  int id = 0;                   ///< obj_id of the data set; 0 = not from one
   std::vector<Vec3f> vertices;  ///< part frame [mm]
+  std::vector<Vec3f> surface;   ///< points spread evenly over it, in an order whose prefixes are even too; may be empty
   double diameter_mm = 0;
   Vec3 box_center = Vec3::Zero();
   SymmetryGroup symmetry;  ///< no discrete entry means the identity alone
@@ -26,6 +28,8 @@ struct Truth {
   std::string part;
   Pose camera_from_part = Pose::Identity();
   double visible_fraction = 1;  ///< BOP visib_fract
+  double bound_mm = 0;          ///< Cramer-Rao bound of the very pixels at the box's centre, norm; 0 = not known
+  double bound_rotation = 0;    ///< [rad]
 };
 
 /// How far an answer is from a truth, modulo the symmetry that brings them closest.
@@ -63,6 +67,13 @@ Judgement judge(std::span<const Instance> answers, std::span<const Truth> truths
 
 Model model_of(const Part& part);
 
+/// Share of the surface in one pose that lies within `limit_mm` of the surface in the other: 1 for poses that a scan
+/// cannot tell apart. \param model  with its surface.
+double overlap(const Model& model, const Pose& a, const Pose& b, double limit_mm);
+
+/// `count` points on the triangles, in equal shares of area. \source van der Corput's sequences in place of chance.
+std::vector<Vec3f> points_on(const Mesh& mesh, int count);
+
 /// The models of a BOP data set, with the true symmetries of models_info.json, in the order of the object ids; the name
 /// is its `name`, or obj_%06d.
 /// \throws Error bad_input
@@ -83,6 +94,16 @@ struct Share {
 };
 /// \source Wilson's score interval.
 Share share_of(int count, int of);
+
+/// A number with its 95 % interval.
+struct Estimate {
+  double value = 0;
+  double low = 0;
+  double high = 0;  ///< infinite where too few values bound it
+  int count = 0;
+};
+/// Quantile q with the interval that order statistics give, without assumption on the distribution.
+Estimate quantile_estimate(const std::vector<double>& values, double q);
 
 /// The value below which a share q of the sorted values lies, between neighbours by line; 0 if there are none.
 double quantile(std::vector<double> values, double q);
