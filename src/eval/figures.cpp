@@ -60,6 +60,17 @@ double calibration_error(const std::vector<JudgedAnswer>& answers, const std::ve
   return sum / static_cast<double>(chosen.size());
 }
 
+/// Mean of the calibration error of scores that are true probabilities: the mean of |right - expected| in each bin.
+double calibration_floor(const std::vector<JudgedAnswer>& answers, const std::vector<int>& chosen) {
+  double sum = 0;
+  for (const std::vector<int>& bin : bins_of(answers, chosen)) {
+    double variance = 0;
+    for (const int a : bin) variance += std::max(0.0, answers[a].score * (1 - answers[a].score));
+    sum += std::sqrt(2 / kPi * variance);
+  }
+  return sum / static_cast<double>(std::max<std::size_t>(1, chosen.size()));
+}
+
 /// 95 % quantiles of chi-square, by the degrees of freedom.
 constexpr std::array<double, 7> kChiSquare95 = {0, 3.8415, 5.9915, 7.8147, 9.4877, 11.0705, 12.5916};
 
@@ -190,6 +201,7 @@ Confidence confidence_of(const Judged& judged) {
                                     [&](const std::vector<int>& chosen) { return calibration_error(answers, chosen); });
   std::vector<int> all(answers.size());
   std::iota(all.begin(), all.end(), 0);
+  out.calibration_floor = calibration_floor(answers, all);
   if (!all.empty())
     for (const std::vector<int>& bin : bins_of(answers, all)) {
       if (bin.empty()) continue;

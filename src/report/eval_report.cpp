@@ -83,8 +83,8 @@ std::string confidence_text(const Confidence& c, bool uncertainty) {
     for (const Confidence::Coverage& coverage : c.coverage)
       out += line("%-22s %s", coverage.group.c_str(), words(coverage.inside).c_str());
   }
-  out += line("\nscore: expected calibration error %s in ten bins of %d answers", words(c.calibration_error, 4).c_str(),
-              c.calibration_error.count);
+  out += line("\nscore: expected calibration error %s in ten bins of %d answers (a perfect score: %.4f)",
+              words(c.calibration_error, 4).c_str(), c.calibration_error.count, c.calibration_floor);
   for (const Confidence::Bin& bin : c.bins) out += line("  score %.3f: right %s", bin.score, words(bin.right).c_str());
   out += line("at 1 %% accepted risk (score >= %.3f): found %s of >= 40 %% visible", c.score_at_risk,
               words(c.given_at_risk).c_str());
@@ -152,6 +152,7 @@ Json figures_json(const Figures& f) {
 Json confidence_json(const Confidence& c) {
   Json out = {{"coverage_95", Json::array()},
               {"calibration_error", estimate_json(c.calibration_error)},
+              {"calibration_error_by_chance", json::significant(c.calibration_floor)},
               {"bins", Json::array()}};
   for (const Confidence::Coverage& coverage : c.coverage)
     out["coverage_95"].push_back({{"group", coverage.group}, {"inside", share_json(coverage.inside)}});

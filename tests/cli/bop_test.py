@@ -100,6 +100,22 @@ class Bop(unittest.TestCase):
         self.assertEqual([(r["scene_id"], [o["obj_id"] for o in r["offered"]]) for r in records], [(4, [2])])
         self.assertGreater(records[0]["stages_ms"]["total"], 0)
 
+    def test_results_are_judged_alike_as_csv_and_as_ndjson(self):
+        judged = []
+        for extension in (".csv", ".ndjson"):
+            out = run("eval", self.data, self.whole.with_suffix(extension), "--json", "-")
+            self.assertEqual(out.returncode, 0, out.stderr)
+            judged.append(json.loads(out.stdout))
+            text = run("eval", self.data, self.whole.with_suffix(extension), "--list")
+            self.assertIn("found of >= 40 % visible", text.stdout)
+        csv, full = judged
+        self.assertEqual((full["images"], full["images_without_result"]), (SCENES, 0))
+        self.assertEqual(csv["groups"], full["groups"])
+        self.assertGreater(full["groups"][0]["recall_40"]["share"], 0.5)
+        self.assertEqual(csv["confidence"]["coverage_95"], [])
+        right = full["groups"][0]["answers"]["found"] + full["groups"][0]["answers"]["not_asked"]
+        self.assertEqual(full["confidence"]["coverage_95"][0]["inside"]["of"], right)
+
     def test_what_cannot_be_is_one_sentence(self):
         targets = WORK / "bad_targets.json"
         targets.write_text(json.dumps([{"im_id": 0, "obj_id": 9, "scene_id": 1}]))
@@ -117,6 +133,8 @@ class Bop(unittest.TestCase):
             (["merge", self.whole, WORK / "missing.csv", "-o", WORK / "x.csv"], 3, "missing.csv"),
             (["merge", self.whole, other, "-o", WORK / "x.csv"], 3, "two files"),
             (["merge", text, "-o", WORK / "x.csv"], 3, "line 1"),
+            (["eval", self.data, text], 3, "line 1"),
+            (["eval", WORK / "none", self.whole], 3, "models_info.json"),
         ]:
             out = run(*arguments)
             self.assertEqual((out.returncode, out.stderr.count("\n")), (code, 1), out.stderr)

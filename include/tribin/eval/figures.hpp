@@ -34,6 +34,7 @@ struct Confidence {
   };
   std::vector<Coverage> coverage;  ///< all first, then by level, class and visible share
   Estimate calibration_error;      ///< of the score, in ten bins of equal count
+  double calibration_floor = 0;    ///< what a perfect score would show of it by chance at these counts
   struct Bin {
     double score = 0;  ///< mean
     Share right;
