@@ -18,7 +18,8 @@ import xml.etree.ElementTree
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 DATA = pathlib.Path(os.environ.get("TRIBIN_DATA", ROOT / "../shared/data"))
 SCENES = DATA / "scenes_dev"
-COMMANDS = ["locate", "segment", "normals", "part", "convert", "patterns", "scan", "simulate", "calibrate", "bop", "merge", "eval", "bench"]
+COMMANDS = ["locate", "segment", "normals", "part", "convert", "patterns", "scan", "simulate", "simulate-controller",
+            "calibrate", "bop", "merge", "eval", "bench"]
 TRIBIN, WORK = sys.argv[1], pathlib.Path(sys.argv[2])
 
 
