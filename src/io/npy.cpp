@@ -116,8 +116,13 @@ std::string encode_npy(const RawArray& array) {
 }
 
 RawCloud cloud_from_array(const FileBytes& file, RawArray array) {
-  RawCloud cloud{
-      .name = file.name, .width = array.width, .height = array.height, .points = {}, .viewpoint = {}, .taken = {}, .warnings = {}};
+  RawCloud cloud{.name = file.name,
+                 .width = array.width,
+                 .height = array.height,
+                 .points = {},
+                 .viewpoint = {},
+                 .taken = {},
+                 .warnings = {}};
   cloud.points.resize(array.values.size() / 3);
   for (std::size_t i = 0; i < cloud.points.size(); ++i) {
     cloud.points[i] = Vec3f(array.values[3 * i], array.values[3 * i + 1], array.values[3 * i + 2]);

@@ -26,7 +26,8 @@ int numbers_of(std::string_view line, double first[3]) {
 }  // namespace
 
 RawCloud parse_xyz(const FileBytes& file) {
-  RawCloud cloud{.name = file.name, .width = 0, .height = 1, .points = {}, .viewpoint = {}, .taken = {}, .warnings = {}};
+  RawCloud cloud{
+      .name = file.name, .width = 0, .height = 1, .points = {}, .viewpoint = {}, .taken = {}, .warnings = {}};
   TextCursor cursor(file);
   std::string_view line;
   int columns = 0;
