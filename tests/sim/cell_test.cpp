@@ -46,15 +46,15 @@ TEST(CellScene, HeapsStayInTheCellsOwnBin) {
 
 TEST(CellScene, FewPartsWhereFewFit) {
   const std::vector<Mesh> parts = foreign_objects(60);
-  const SceneStock stock = make_stock(parts, SceneKind::bin, settings_of(Level::dense));
+  const SceneStock stock = make_stock(parts, SceneKind::bin, settings_of(Level::hard));
   CellView cell = some_cell();
-  const std::size_t many = draw_bin_scene(stock, SceneKind::bin, settings_of(Level::dense), 1, cell).bodies.size();
+  const std::size_t many = draw_bin_scene(stock, SceneKind::bin, settings_of(Level::hard), 1, cell).bodies.size();
   cell.bin = {90, 80, 50, 5};
-  const std::size_t few = draw_bin_scene(stock, SceneKind::bin, settings_of(Level::dense), 1, cell).bodies.size();
+  const std::size_t few = draw_bin_scene(stock, SceneKind::bin, settings_of(Level::hard), 1, cell).bodies.size();
   EXPECT_LT(few, many);
   EXPECT_GT(few, 2u);
   cell.bin = {90, 80, 1, 5};
-  EXPECT_THROW(draw_bin_scene(stock, SceneKind::bin, settings_of(Level::dense), 1, cell), Error);
+  EXPECT_THROW(draw_bin_scene(stock, SceneKind::bin, settings_of(Level::hard), 1, cell), Error);
 }
 
 TEST(CellScene, TheCameraMustSeeTheBin) {
