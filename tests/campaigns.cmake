@@ -11,7 +11,11 @@ foreach(source ${campaigns})
     endif()
   endforeach()
 endforeach()
-target_compile_definitions(campaign_paper PRIVATE TRIBIN_CLI="$<TARGET_FILE:tribin_cli>")
-add_dependencies(campaign_paper tribin_cli)
+foreach(name paper heaps flips)  # they drive the command line
+  if(TARGET campaign_${name})
+    target_compile_definitions(campaign_${name} PRIVATE TRIBIN_CLI="$<TARGET_FILE:tribin_cli>")
+    add_dependencies(campaign_${name} tribin_cli)
+  endif()
+endforeach()
 target_include_directories(campaign_primitives PRIVATE ${CMAKE_CURRENT_SOURCE_DIR})
 target_include_directories(campaign_simulator PRIVATE ${PROJECT_SOURCE_DIR}/src)  # draws scenes as data sets do

@@ -53,6 +53,8 @@ std::vector<Model> read_bop_models(const std::filesystem::path& models_dir) {
       model.symmetry.discrete.push_back(Pose::Identity());
       if (info.contains("symmetries_discrete"))
         for (const Json& rows : info["symmetries_discrete"]) model.symmetry.discrete.push_back(pose_of_rows(rows));
+      if (info.contains("near_symmetries_discrete"))
+        for (const Json& rows : info["near_symmetries_discrete"]) model.near_symmetries.push_back(pose_of_rows(rows));
       if (info.contains("symmetries_continuous"))
         for (const Json& s : info["symmetries_continuous"])
           model.symmetry.continuous.push_back({vector_of(s.at("axis")), vector_of(s.at("offset"))});

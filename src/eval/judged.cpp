@@ -162,6 +162,11 @@ Judged judge_image(const Image& image, std::span<const Model> models, double min
     truth.at_mm = center_of(model, offered[t].camera_from_part);
     if (truth.answer < 0)
       truth.reason = reason_near(result.rejected, truth.part, truth.at_mm, kSamePlace * model.diameter_mm);
+    truth.withheld =
+        truth.answer < 0 && std::any_of(result.uncertain.begin(), result.uncertain.end(), [&](const Instance& unsure) {
+          return unsure.part == truth.part &&
+                 (center_of(model, unsure.camera_from_part) - truth.at_mm).norm() < kSamePlace * model.diameter_mm;
+        });
     out.truths.push_back(std::move(truth));
   }
   return out;

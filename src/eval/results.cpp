@@ -106,6 +106,8 @@ void read_record(const std::string& text, const fs::path& file, int line, ByImag
     const Json record = Json::parse(text);
     ImageResult& image = image_of(images, record.at("scene_id"), record.at("im_id"));
     for (const Json& instance : record.at("instances")) image.instances.push_back(instance_from(instance));
+    if (record.contains("uncertain"))
+      for (const Json& instance : record.at("uncertain")) image.uncertain.push_back(instance_from(instance));
     for (const Json& reason : record.at("rejected")) image.rejected.push_back(reason_from(reason));
     image.offered.emplace();
     for (const Json& object : record.at("offered")) image.offered->push_back(object.at("part"));

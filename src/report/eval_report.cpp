@@ -67,12 +67,12 @@ std::string tables(const std::vector<Figures>& groups) {
                   words(f.bound_ratio_mm, 2).c_str(), words(f.bound_rms_mm, 2).c_str(),
                   words(f.bound_ratio_deg, 2).c_str(), words(f.bound_rms_deg, 2).c_str());
   }
-  out += line("\n%-22s %5s %9s %5s %11s %11s %7s  %-26s %s", "false answers", "flip", "duplicate", "class", "place",
-              "nothing", "told", "flips of given out", "right but undecided");
+  out += line("\n%-22s %5s %9s %5s %11s %11s %7s  %-26s %-26s %s", "false answers", "flip", "duplicate", "class",
+              "place", "nothing", "told", "flips of given out", "right but undecided", "listed as uncertain");
   for (const Figures& f : groups)
-    out +=
-        line("%-22s %5d %9d %5d %11d %11d %7d  %-26s %s", f.name.c_str(), f.verdicts[3], f.verdicts[2], f.verdicts[4],
-             f.verdicts[5], f.verdicts[6], f.told, words(f.flips).c_str(), words(f.undecided).c_str());
+    out += line("%-22s %5d %9d %5d %11d %11d %7d  %-26s %-26s %s", f.name.c_str(), f.verdicts[3], f.verdicts[2],
+                f.verdicts[4], f.verdicts[5], f.verdicts[6], f.told, words(f.flips).c_str(), words(f.undecided).c_str(),
+                words(f.withheld).c_str());
   return out;
 }
 
@@ -97,9 +97,9 @@ std::string list_text(const Judged& judged) {
   std::string out = line("\nmissed parts that show >= 40 %%:");
   for (const JudgedTruth& t : judged.truths)
     if (t.answer < 0 && t.visible >= 0.4)
-      out += line("  scene %d image %d %s %s, visible %.2f, at (%.1f, %.1f, %.1f)%s%s", t.scene, t.image,
+      out += line("  scene %d image %d %s %s, visible %.2f, at (%.1f, %.1f, %.1f)%s%s%s", t.scene, t.image,
                   t.level.c_str(), t.part.c_str(), t.visible, t.at_mm.x(), t.at_mm.y(), t.at_mm.z(),
-                  t.reason.empty() ? "" : ": ", t.reason.c_str());
+                  t.withheld ? ", listed as uncertain" : "", t.reason.empty() ? "" : ": ", t.reason.c_str());
   out += line("false answers:");
   for (const JudgedAnswer& a : judged.answers)
     if (eval::is_false(a.verdict))
@@ -139,6 +139,7 @@ Json figures_json(const Figures& f) {
           {"flips", share_json(f.flips)},
           {"confusions", share_json(f.confusions)},
           {"undecided", share_json(f.undecided)},
+          {"withheld", share_json(f.withheld)},
           {"told", f.told},
           {"translation_mm", {{"median", estimate_json(f.median_mm)}, {"quantile_95", estimate_json(f.high_mm)}}},
           {"rotation_deg", {{"median", estimate_json(f.median_deg)}, {"quantile_95", estimate_json(f.high_deg)}}},
@@ -202,6 +203,7 @@ std::string eval_json(const Judged& judged) {
                                {"part", t.part},
                                {"visible_fraction", json::rounded(t.visible, 4)},
                                {"at_mm", json::millimetres(t.at_mm)},
+                               {"uncertain", t.withheld},
                                {"reason", t.reason}});
   out["false_answers"] = Json::array();
   for (const JudgedAnswer& a : judged.answers)

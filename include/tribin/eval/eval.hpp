@@ -20,7 +20,8 @@ struct Model {
   std::vector<Vec3f> surface;   ///< points spread evenly over it, in an order whose prefixes are even too; may be empty
   double diameter_mm = 0;
   Vec3 box_center = Vec3::Zero();
-  SymmetryGroup symmetry;  ///< no discrete entry means the identity alone
+  std::vector<Pose> near_symmetries;  ///< part_from_part, that leave most of the surface in place
+  SymmetryGroup symmetry;             ///< no discrete entry means the identity alone
 };
 
 /// A part that is really there.

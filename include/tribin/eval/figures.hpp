@@ -19,6 +19,7 @@ struct Figures {
   int verdicts[7] = {};                      ///< answers by Verdict
   Share flips, confusions;                   ///< of all that is given out
   Share undecided;                           ///< right ones with alternatives, of all right ones
+  Share withheld;                            ///< parts >= 40 % visible that are listed as uncertain instead
   int told = 0;                              ///< false ones whose alternatives hold the truth
   Estimate median_mm, high_mm;               ///< of the found: median and 95 % of the translation error
   Estimate median_deg, high_deg;             ///< of the rotation error

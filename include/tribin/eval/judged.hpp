@@ -46,6 +46,7 @@ struct JudgedTruth {
   double visible = 0;
   int answer = -1;            ///< index of the right answer; -1 = missed
   Vec3 at_mm = Vec3::Zero();  ///< the box's centre, camera frame
+  bool withheld = false;      ///< missed, but listed as uncertain at its place
   std::string reason;         ///< missed: what the nearest refused candidate fell to, where the results tell
 };
 

@@ -15,6 +15,7 @@ struct ImageResult {
   int scene = 0;
   int image = 0;
   std::vector<Instance> instances;                  ///< best first
+  std::vector<Instance> uncertain;                  ///< listed, not given out; from NDJSON
   std::vector<Reason> rejected;                     ///< from NDJSON
   std::optional<std::vector<std::string>> offered;  ///< parts that were looked for; from NDJSON
   double seconds = -1;                              ///< -1 = not known
