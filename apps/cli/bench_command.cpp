@@ -2,6 +2,7 @@
 #include <cmath>
 #include <iostream>
 
+#include "bench_heaps.hpp"
 #include "bench_peers.hpp"
 #include "commands.hpp"
 #include "output.hpp"
@@ -19,6 +20,8 @@ namespace {
 
 struct Options {
   std::vector<std::string> parts = {"examples/parts/alternator_a.step", "examples/parts/alternator_b.step"};
+  std::string heaps;
+  int scenes = 10;
   std::string json, unit = "mm", method = "both";
   int poses = 40;
   int first = 1;
@@ -100,7 +103,7 @@ PaperRun run_one(const std::vector<Part>& parts, const std::vector<eval::Model>&
   return run;
 }
 
-int run(const Options& options, const Context& context) {
+int run_experiment(const Options& options, const Context& context) {
   const std::vector<Part> parts = read_parts(part_arguments(options.parts), options.unit);
   if (options.peers) {
     constexpr int kScenes = 3;  // of each part: a peer takes seconds for one
@@ -130,8 +133,14 @@ int run(const Options& options, const Context& context) {
   return 0;
 }
 #else
-int run(const Options&, const Context&) { refuse_without_simulation(); }
+int run_experiment(const Options&, const Context&) { refuse_without_simulation(); }
 #endif
+
+int run(const Options& options, const Context& context) {
+  if (options.heaps.empty()) return run_experiment(options, context);
+  std::cout << compare_heaps(options.heaps, options.scenes);
+  return 0;
+}
 
 }  // namespace
 
@@ -160,6 +169,12 @@ void add_bench(CLI::App& app, Context& context) {
   command->add_option("--unit", options->unit, "Unit of CAD files that name none: mm, cm, m, inch")->type_name("U");
   command->add_option("--json", options->json, "Write every run as JSON; - is stdout")->type_name("OUT|-");
   command->add_flag("--peers", options->peers, "Instead: normals, segmentation and decoding beside other libraries");
+  command->add_option("--heaps", options->heaps, "Instead: a data set of tribin simulate, beside other libraries")
+      ->check(CLI::ExistingDirectory)
+      ->type_name("DATASET");
+  command->add_option("--scenes", options->scenes, "Of --heaps: the first ones")
+      ->check(CLI::Range(1, 100000))
+      ->type_name("N");
   command->add_flag("--no-times", options->no_times, "Leave the times out: same input, same bytes");
   command->callback([options, &context] { context.run = [options, &context] { return run(*options, context); }; });
 }

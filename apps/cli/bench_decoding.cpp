@@ -143,10 +143,10 @@ std::string compare_decoding(const Part& part, int seed) {
   } else {
     StagedOutput scratch(fs::temp_directory_path() / "tribin_decoding");
     fs::create_directories(scratch.path());
-    write_raw(scratch.path() / "looks", looks);
+    peer::write_raw((scratch.path() / "looks").string(), looks);
     PinholeCamera request{scan.width(), scan.height(), kWidth, kHeight, kModulation, kNoise};
     const auto times = run_peer(program, scratch.path() / "looks", scratch.path() / "columns", request);
-    const std::vector<int> columns = read_raw<int>(scratch.path() / "columns", scan.z_mm.size());
+    const std::vector<int> columns = peer::read_raw<int>((scratch.path() / "columns").string(), scan.z_mm.size());
     if (times.empty() || columns.empty()) {
       out += "  " + name + ": failed\n";
     } else {

@@ -124,7 +124,7 @@ void write_cloud(const Scene& scene, Task task, const fs::path& path) {
       for (int i = 0; i < 3; ++i) values.push_back(static_cast<float>(p[i]));
       for (int i = 0; i < 3 && task == Task::segmentation; ++i) values.push_back(s.normal(u, v)[i]);
     }
-  write_raw(path, values);
+  peer::write_raw(path.string(), values);
 }
 
 Score ours(const Scene& scene, Task task) {
@@ -155,17 +155,16 @@ Score of_peer(const Scene& scene, Task task, double ms, const fs::path& out) {
   const std::size_t pixels = scene.paper.simulated.body.size();
   Score score;
   if (task == Task::normals) {
-    const std::vector<float> normals = read_raw<float>(out, 3 * pixels);
+    const std::vector<float> normals = peer::read_raw<float>(out, 3 * pixels);
     if (normals.empty()) return {-1, 0, 0};
     score = score_normals(scene.paper.simulated, normals);
   } else {
-    constexpr int kCylinderBit = 1 << 16;
     Labels labels;
-    labels.of_pixel = read_raw<int>(out, pixels);
+    labels.of_pixel = peer::read_raw<int>(out, pixels);
     if (labels.of_pixel.empty()) return {-1, 0, 0};
     for (int& id : labels.of_pixel) {
-      const bool cylinder = id & kCylinderBit;
-      id &= ~kCylinderBit;
+      const bool cylinder = id & peer::kCylinderBit;
+      id &= ~peer::kCylinderBit;
       if (id > 0) labels.type[id] = cylinder ? PrimitiveType::cylinder : PrimitiveType::plane;
     }
     score = score_labels(scene.truth, labels);

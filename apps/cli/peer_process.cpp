@@ -12,11 +12,12 @@ namespace fs = std::filesystem;
 fs::path peer_folder() { return fs::read_symlink("/proc/self/exe").parent_path() / "peers"; }
 
 std::map<std::string, double> run_peer(const fs::path& program, const fs::path& in, const fs::path& out,
-                                       const PinholeCamera& camera) {
+                                       const PinholeCamera& camera, const std::vector<fs::path>& models) {
   std::string command;
   for (const fs::path& word : {program, in, out}) command += "'" + word.string() + "' ";
   command += std::to_string(camera.width) + " " + std::to_string(camera.height);
   for (const double x : {camera.fx, camera.fy, camera.cx, camera.cy}) command += " " + std::to_string(x);
+  for (const fs::path& model : models) command += " '" + model.string() + "'";
   std::FILE* pipe = popen(command.c_str(), "r");
   if (pipe == nullptr) return {};
   char line[256] = {};

@@ -61,5 +61,5 @@ int main(int argc, char** argv) {
     for (const std::size_t k : shape->indices_of_assigned_points())
       labels[std::get<2>(points[k])] = id | (cylinder ? peer::kCylinderBit : 0);
   }
-  peer::write_values(r.out, labels);
+  peer::write_raw(r.out, labels);
 }

@@ -55,5 +55,5 @@ int main(int argc, char** argv) {
   code->decode(cameras, disparity, std::vector<cv::Mat>{dark, dark}, std::vector<cv::Mat>{lit, lit},
                cv::structured_light::DECODE_3D_UNDERWORLD);
   std::printf("{\"ms\": %.3f, \"decode_ms\": %.3f}\n", each, whole.ms() / 2);
-  peer::write_values(r.out, columns);
+  peer::write_raw(r.out, columns);
 }

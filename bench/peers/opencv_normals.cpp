@@ -26,5 +26,5 @@ int main(int argc, char** argv) {
         const float x = normals.at<cv::Vec3f>(v, u)[i];
         out[3 * (static_cast<std::size_t>(v) * r.width + u) + i] = std::isfinite(x) ? x : 0;
       }
-  peer::write_values(r.out, out);
+  peer::write_raw(r.out, out);
 }

@@ -30,5 +30,5 @@ int main(int argc, char** argv) {
   for (std::size_t i = 0; i < pixels; ++i)
     for (int k = 0; k < 3; ++k)
       if (const float x = normals[i].normal[k]; std::isfinite(x)) out[3 * i + static_cast<std::size_t>(k)] = x;
-  peer::write_values(r.out, out);
+  peer::write_raw(r.out, out);
 }
