@@ -32,6 +32,9 @@ CellMask mask_of(const Part& part, const SceneDepth& scene, const PoseCandidate&
 std::vector<double> log_likelihoods(const SceneDepth& scene, std::span<const std::pair<const Part*, Pose>> poses,
                                     int step_px);
 
+/// Worth a fit on more pixels? By its verification on a thousand.
+bool hopeful(const Part& part, const PoseCandidate& candidate, std::vector<Reason>& rejected);
+
 /// A candidate refined and verified on some thousand pixels, as it stands: no other pose is tried.
 PoseCandidate settled_on_scan(const SceneDepth& scene, const Part& part, const PoseCandidate& candidate);
 

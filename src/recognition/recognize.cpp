@@ -176,6 +176,11 @@ std::vector<Polished> choose(const SceneDepth& scene, std::span<const Part> part
       rivals.push_back(k);
     }
     for (const std::size_t k : rivals) done[k] = true;
+    std::erase_if(rivals, [&](std::size_t k) {
+      if (hopeful(parts[static_cast<std::size_t>(candidates[k].part)], candidates[k], rejected)) return false;
+      refused.candidates.push_back(candidates[k]);
+      return true;
+    });
     std::vector<PoseCandidate> settled(rivals.size());
     parallel_each(static_cast<int>(rivals.size()), [&](int r) {
       const PoseCandidate& c = candidates[rivals[static_cast<std::size_t>(r)]];

@@ -1,0 +1,64 @@
+#include "render_scores.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "tribin/core/parallel.hpp"
+#include "tribin/pose/index_render.hpp"
+
+namespace tribin {
+namespace {
+
+double score_of(const SceneDepth& scene, const IndexRender& render, double chord_error_mm) {
+  constexpr float kUnexplained = 0.5f * 16;  // 4 sigma: what a pixel costs that no surface explains
+  const PinholeCamera& camera = scene.camera;
+  const Image<float>& tiles = scene.surfels->local_sigma_mm;
+  const int tile_px = 8 * scene.cell_px;
+  const auto cad_variance = static_cast<float>(chord_error_mm * chord_error_mm);
+  double sum = 0;
+  for (int j = 0; j < render.height; ++j) {
+    const int v = render.v0 + j * render.step;
+    const float ray_y = static_cast<float>((v - camera.cy) / camera.fy);
+    const int tile_row = std::min(v / tile_px, tiles.height - 1);
+    int tile = -1, tile_end = 0;  // columns of the tile
+    float sigma = 0, row = 0;
+    for (int i = 0; i < render.width; ++i) {
+      const std::size_t k = render.index(i, j);
+      if (render.triangle[k] < 0) continue;
+      const int u = render.u0 + i * render.step;
+      const float z = scene.z_mm(u, v);
+      if (!(z > 0)) continue;
+      if (u >= tile_end) {
+        tile = std::min(u / tile_px, tiles.width - 1);
+        tile_end = tile == tiles.width - 1 ? scene.z_mm.width : (tile + 1) * tile_px;
+        sigma = tiles(tile, tile_row);
+      }
+      const Vec3f& n = render.normal[static_cast<std::size_t>(render.triangle[k])];
+      const float ray_x = static_cast<float>((u - camera.cx) / camera.fx);
+      const float slant = std::max(0.2f, std::abs(n[0] * ray_x + n[1] * ray_y + n[2]));
+      const float error = (z - 1 / render.inverse_z[k]) * slant;
+      const float variance = sigma * slant * sigma * slant + cad_variance;
+      row += kUnexplained - std::min(kUnexplained, 0.5f * error * error / variance);
+    }
+    sum += row;
+  }
+  return sum;
+}
+
+}  // namespace
+
+std::vector<double> render_scores(const SceneDepth& scene, const Part& part, std::span<const Pose> poses, int step_px) {
+  std::vector<double> out(poses.size());
+  parallel_each(static_cast<int>(poses.size()), [&](int i) {
+    const auto k = static_cast<std::size_t>(i);
+    thread_local IndexRender render;
+    render_index(part.render_mesh, scene.camera, poses[k], step_px, render);
+    out[k] = score_of(scene, render, part.mesh.chord_error_mm);
+  });
+  // Pixels closer than the noise's correlation tell the same story.
+  const double inflation = std::max(1.0, correlation_inflation(scene.correlation_px) / (double(step_px) * step_px));
+  for (double& score : out) score /= inflation;
+  return out;
+}
+
+}  // namespace tribin
