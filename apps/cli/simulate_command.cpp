@@ -1,10 +1,12 @@
 #include <cstdio>
 
+#include "cell_view.hpp"
 #include "commands.hpp"
 #include "output.hpp"
 #include "progress.hpp"
 #include "tribin/core/error.hpp"
 #include "tribin/io/cad_files.hpp"
+#include "tribin/io/taken_file.hpp"
 #ifdef TRIBIN_WITH_SIM
 #include "tribin/sim/dataset.hpp"
 #endif
@@ -14,7 +16,8 @@ namespace {
 
 struct Options {
   std::vector<std::string> parts;
-  std::string kind = "table", level = "easy", out, unit = "mm";
+  std::string cell, flange;
+  std::string kind, level = "easy", out, unit = "mm";
   int scenes = 1;
   std::uint64_t seed = 1;
   double systematic = -1, scale_error = 0;
@@ -24,7 +27,16 @@ struct Options {
 #ifdef TRIBIN_WITH_SIM
 int run(const Options& options, const Context& context) {
   sim::DatasetOptions dataset;
-  dataset.kind = sim::scene_kind_of(options.kind);
+  const bool in_cell = !options.cell.empty();
+  const std::string kind = !options.kind.empty() ? options.kind : in_cell ? "bin" : "table";
+  dataset.kind = sim::scene_kind_of(kind);
+  if (in_cell) {
+    const WorkCell cell = read_work_cell_logged(options.cell);
+    std::optional<Pose> base_from_flange;
+    if (!options.flange.empty()) base_from_flange = robot_pose_from_text(options.flange);
+    dataset.cell = cell_view_of(cell, base_from_flange);
+    if (options.parts.empty()) dataset.parts = meshes_of(cell);
+  }
   dataset.level = sim::level_of(options.level);
   dataset.scenes = options.scenes;
   dataset.seed = options.seed;
@@ -42,7 +54,7 @@ int run(const Options& options, const Context& context) {
     sim::simulate_dataset(dataset, options.out);
   }
   std::printf("%s: %d scene%s of kind %s, level %s\n", options.out.c_str(), options.scenes,
-              options.scenes == 1 ? "" : "s", options.kind.c_str(), options.level.c_str());
+              options.scenes == 1 ? "" : "s", kind.c_str(), options.level.c_str());
   return 0;
 }
 #else
@@ -55,14 +67,21 @@ void add_simulate(CLI::App& app, Context& context) {
   auto options = std::make_shared<Options>();
   CLI::App* command = add_command(
       app, context, "simulate", "Make scans of parts on a table or in a bin, with their truth, as a BOP data set",
-      "tribin simulate --part pulley.step --part shaft.stl --kind bin --level dense -o scenes --scenes 10");
-  command->add_option("--part", options->parts, "CAD of a part; repeat it for more")
-      ->required()
+      "tribin simulate --part pulley.step --part shaft.stl --kind bin --level dense -o scenes --scenes 10\n"
+      "  tribin simulate examples/cells/bench_cell.toml -o scenes --scenes 10");
+  command->add_option("CELL.toml", options->cell, "Work cell: its bin, camera and parts, in place of drawn ones")
+      ->type_name("FILE");
+  command
+      ->add_option("--base-from-flange", options->flange,
+                   "Where the robot holds the cell's camera, if it is on the flange: \"yaskawa 600 0 900 180 0 0\"")
+      ->type_name("POSE");
+  command->add_option("--part", options->parts, "CAD of a part; repeat it for more; with a cell: in place of its parts")
       ->type_name("[NAME=]CAD")
       ->allow_extra_args(false);
   command
-      ->add_option("--kind", options->kind,
-                   "table: side by side; bin: a heap made by physics; empty, foreign: a bin without parts")
+      ->add_option(
+          "--kind", options->kind,
+          "table: side by side; bin: a heap made by physics (of a cell always); empty, foreign: a bin without parts")
       ->type_name("K");
   command->add_option("--level", options->level, "easy, dense, hard: parts, noise, tilt, lost pixels")->type_name("L");
   command->add_option("-o", options->out, "Folder of the data set; scenes that it holds are kept")

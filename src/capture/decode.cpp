@@ -108,7 +108,9 @@ void check_code_and_phase(const Job<T>& job, const AxisPlan& axis, Decoded& out)
 template <class T>
 Decoded decode_images(const FrameStack& frames, const std::vector<Image<T>>& images, const DecodePlan& plan,
                       const DecodeOptions& options) {
-  const double full = options.full_scale > 0 ? options.full_scale : std::numeric_limits<T>::max();
+  const double full = options.full_scale > 0  ? options.full_scale
+                      : frames.full_scale > 0 ? frames.full_scale
+                                              : std::numeric_limits<T>::max();
   Job<T> job{images, plan};
   job.scale = static_cast<float>(255 / full);
   job.limit = 255 - 0.5f * std::min(1.0f, job.scale);

@@ -75,25 +75,54 @@ void complete_periods(const JsonPlace& place, std::vector<Entry>& entries) {
   }
 }
 
-FrameStack read_stack(const std::filesystem::path& folder, const std::string& camera,
-                      const std::vector<Entry>& entries) {
-  FrameStack out;
-  out.camera = camera;
-  std::vector<io::GreyImage> images(entries.size());
-  parallel_each(static_cast<int>(entries.size()), [&](int i) {
-    images[static_cast<std::size_t>(i)] =
-        io::decode_grey_png(io::read_file(folder / entries[static_cast<std::size_t>(i)].file));
+/// The images of a stack, all of 8 or all of 16 bit.
+void read_images(const std::filesystem::path& folder, FrameStack& out) {
+  std::vector<io::GreyImage> images(out.files.size());
+  parallel_each(static_cast<int>(images.size()), [&](int i) {
+    const auto k = static_cast<std::size_t>(i);
+    images[k] = io::decode_grey_png(io::read_file(folder / out.files[k]));
   });
   const bool wide = std::any_of(images.begin(), images.end(), [](const auto& i) { return i.grey8.empty(); });
-  for (std::size_t i = 0; i < entries.size(); ++i) {
+  for (std::size_t i = 0; i < images.size(); ++i) {
     if (wide != images[i].grey8.empty())
-      bad_file(entries[i].file, "byte 24", "8 bits", "16 bits as other images of camera " + camera);
-    out.patterns.push_back(entries[i].pattern);
-    out.files.push_back(entries[i].file);
+      bad_file(out.files[i], "byte 24", "8 bits", "16 bits as other images of camera " + out.camera);
     if (wide)
       out.grey16.push_back(std::move(images[i].grey16));
     else
       out.grey8.push_back(std::move(images[i].grey8));
+  }
+}
+
+/// What frames.json says of each camera.
+std::vector<FrameStack> read_list(const std::filesystem::path& path) {
+  const io::FileBytes file = io::read_file(path);
+  const nlohmann::json document = io::parse_json(file, "frames.json");
+  const JsonPlace top(file.name, document, JsonPlace::kTop);
+  int width = 0, height = 0;
+  if (top.has("projector") && !top.at("projector", "").value().is_null()) {
+    constexpr const char* kSize = "{\"width\", \"height\"} in pixels, 1..65535";
+    width = top.at("projector", kSize).at("width", kSize).whole(1, 65535, kSize);
+    height = top.at("projector", kSize).at("height", kSize).whole(1, 65535, kSize);
+  }
+  constexpr const char* kCameras = "a list of one camera or more";
+  const JsonPlace cameras = top.at("cameras", kCameras);
+  if (cameras.array_size(kCameras) == 0) cameras.fail(kCameras);
+  std::vector<FrameStack> out(cameras.array_size(kCameras));
+  for (std::size_t c = 0; c < out.size(); ++c) {
+    const JsonPlace camera = cameras.at(c), patterns = camera.at("patterns", "a list of patterns");
+    if (patterns.array_size("a list of patterns") == 0) patterns.fail("a list of patterns");
+    std::vector<Entry> entries;
+    for (std::size_t i = 0; i < patterns.value().size(); ++i) entries.push_back(entry_of(patterns.at(i)));
+    complete_periods(patterns, entries);
+    FrameStack& stack = out[c];
+    stack.camera = camera.at("camera", "its name").text("its name");
+    constexpr const char* kScale = "the largest grey value that the camera gives, 1..65535";
+    if (camera.has("full_scale")) stack.full_scale = camera.at("full_scale", kScale).number(1, 65535, kScale);
+    stack.projector_width = width, stack.projector_height = height;
+    for (Entry& entry : entries) {
+      stack.patterns.push_back(entry.pattern);
+      stack.files.push_back(std::move(entry.file));
+    }
   }
   return out;
 }
@@ -113,35 +142,24 @@ nlohmann::ordered_json entry_json(const Pattern& p, const std::string& file) {
   }
   if (p.kind == PatternKind::phase) entry["shift_deg"] = p.shift_rad / kDegree;
   if (p.bit >= 0) entry["bit"] = p.bit;
+  if (p.exposure_ms > 0) entry["exposure_ms"] = p.exposure_ms;
   return entry;
 }
 
 }  // namespace
 
 std::vector<FrameStack> read_frames(const std::filesystem::path& folder, const std::filesystem::path& frames_file) {
-  const io::FileBytes file = io::read_file(frames_file.empty() ? folder / "frames.json" : frames_file);
-  const nlohmann::json document = io::parse_json(file, "frames.json");
-  const JsonPlace top(file.name, document, JsonPlace::kTop);
-  int width = 0, height = 0;
-  if (top.has("projector") && !top.at("projector", "").value().is_null()) {
-    constexpr const char* kSize = "{\"width\", \"height\"} in pixels, 1..65535";
-    width = top.at("projector", kSize).at("width", kSize).whole(1, 65535, kSize);
-    height = top.at("projector", kSize).at("height", kSize).whole(1, 65535, kSize);
-  }
-  constexpr const char* kCameras = "a list of one camera or more";
-  const JsonPlace cameras = top.at("cameras", kCameras);
-  if (cameras.array_size(kCameras) == 0) cameras.fail(kCameras);
-  std::vector<FrameStack> out;
-  for (std::size_t c = 0; c < cameras.array_size(kCameras); ++c) {
-    const JsonPlace camera = cameras.at(c), patterns = camera.at("patterns", "a list of patterns");
-    if (patterns.array_size("a list of patterns") == 0) patterns.fail("a list of patterns");
-    std::vector<Entry> entries;
-    for (std::size_t i = 0; i < patterns.value().size(); ++i) entries.push_back(entry_of(patterns.at(i)));
-    complete_periods(patterns, entries);
-    out.push_back(read_stack(folder, camera.at("camera", "its name").text("its name"), entries));
-    out.back().projector_width = width, out.back().projector_height = height;
-  }
+  std::vector<FrameStack> out = read_list(frames_file.empty() ? folder / "frames.json" : frames_file);
+  for (FrameStack& stack : out) read_images(folder, stack);
   return out;
+}
+
+FrameStack read_sequence(const std::filesystem::path& path) {
+  const std::filesystem::path file = std::filesystem::is_directory(path) ? path / "frames.json" : path;
+  std::vector<FrameStack> out = read_list(file);
+  if (out.size() != 1)
+    bad_file(file.string(), "cameras", std::to_string(out.size()) + " cameras", "the patterns of one");
+  return std::move(out[0]);
 }
 
 void write_patterns(const std::filesystem::path& folder, const std::vector<Pattern>& patterns, int width, int height,
@@ -161,19 +179,29 @@ void write_patterns(const std::filesystem::path& folder, const std::vector<Patte
   io::write_file(folder / "frames.json", out.dump(1) + "\n");
 }
 
-void write_frames(const std::filesystem::path& folder, const FrameStack& frames) {
-  TRIBIN_ASSERT(frames.files.size() == frames.patterns.size() && frames.grey16.size() <= frames.patterns.size());
+void write_frames(const std::filesystem::path& folder, const std::vector<FrameStack>& stacks) {
   make_folder(folder);
-  nlohmann::ordered_json list = nlohmann::ordered_json::array();
-  for (std::size_t i = 0; i < frames.patterns.size(); ++i) {
-    io::write_file(folder / frames.files[i],
-                   frames.grey8.empty() ? io::encode_png16(frames.grey16.at(i)) : io::encode_png8(frames.grey8.at(i)));
-    list.push_back(entry_json(frames.patterns[i], frames.files[i]));
-  }
   nlohmann::ordered_json out;
-  if (frames.projector_width > 0)
-    out["projector"] = {{"width", frames.projector_width}, {"height", frames.projector_height}};
-  out["cameras"] = {nlohmann::ordered_json{{"camera", frames.camera}, {"patterns", list}}};
+  if (!stacks.empty() && stacks[0].projector_width > 0)
+    out["projector"] = {{"width", stacks[0].projector_width}, {"height", stacks[0].projector_height}};
+  out["cameras"] = nlohmann::ordered_json::array();
+  for (std::size_t c = 0; c < stacks.size(); ++c) {
+    const FrameStack& frames = stacks[c];
+    TRIBIN_ASSERT(frames.grey8.size() + frames.grey16.size() == frames.patterns.size());
+    nlohmann::ordered_json list = nlohmann::ordered_json::array();
+    for (std::size_t i = 0; i < frames.patterns.size(); ++i) {
+      // Names of the recording itself: those of a foreign folder may lead anywhere.
+      const std::string name =
+          (stacks.size() > 1 ? std::to_string(c) + "_" : "") + pattern_file_name(frames.patterns, i);
+      io::write_file(folder / name,
+                     frames.grey8.empty() ? io::encode_png16(frames.grey16[i]) : io::encode_png8(frames.grey8[i]));
+      list.push_back(entry_json(frames.patterns[i], name));
+    }
+    nlohmann::ordered_json camera{{"camera", frames.camera}};
+    if (frames.full_scale > 0) camera["full_scale"] = frames.full_scale;
+    camera["patterns"] = std::move(list);
+    out["cameras"].push_back(std::move(camera));
+  }
   io::write_file(folder / "frames.json", out.dump(1) + "\n");
 }
 

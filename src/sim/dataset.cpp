@@ -10,6 +10,7 @@
 
 #include "io/atomic_file.hpp"
 #include "sim/drawn_scene.hpp"
+#include "sim/frames_of_scene.hpp"
 #include "sim/random.hpp"
 #include "tribin/cad/measure.hpp"
 #include "tribin/core/error.hpp"
@@ -18,7 +19,6 @@
 #include "tribin/io/rig_file.hpp"
 #include "tribin/sim/bop_writer.hpp"
 #include "tribin/sim/paper_experiment.hpp"
-#include "tribin/sim/render_frames.hpp"
 
 namespace tribin::sim {
 namespace {
@@ -34,6 +34,10 @@ void check(const DatasetOptions& options) {
   if (options.scenes < 1)
     throw Error(ErrorCode::bad_option,
                 "simulate: --scenes is " + std::to_string(options.scenes) + "; wanted 1 or more");
+  if (options.cell && options.kind == SceneKind::table)
+    throw Error(ErrorCode::bad_option,
+                "simulate: --kind table does not go with a work cell, which has a bin; wanted "
+                "bin, empty or foreign");
   std::set<std::string> names;
   for (const Mesh& part : options.parts)
     if (!names.insert(part.name).second)
@@ -69,6 +73,17 @@ ordered_json recipe_of(const DatasetOptions& options) {
                          {"frames", options.frames},
                          {"version", TRIBIN_VERSION},
                          {"parts", parts}};
+  if (options.cell) {
+    const CellView& cell = *options.cell;
+    const PinholeCamera& c = cell.camera;
+    const Bin& bin = cell.bin;
+    ordered_json pose = ordered_json::array();
+    for (int i = 0; i < 12; ++i) pose.push_back(cell.camera_from_bin.matrix()(i / 4, i % 4));
+    recipe["cell"] = {{"camera", {c.width, c.height, c.fx, c.fy, c.cx, c.cy}},
+                      {"noise", {cell.noise.sigma_mm, cell.noise.correlation_px}},
+                      {"camera_from_bin", pose},
+                      {"bin", {bin.length_mm, bin.width_mm, bin.height_mm, bin.wall_mm}}};
+  }
   if (options.systematic) recipe["systematic"] = *options.systematic;
   if (options.scale_error > 0) recipe["scale_error"] = options.scale_error;
   return recipe;
@@ -91,22 +106,15 @@ void open_dataset(const DatasetOptions& options, const fs::path& directory) {
   if (fs::exists(directory / "test"))
     throw Error(ErrorCode::bad_option,
                 directory.string() + " holds scenes without their dataset.json; wanted an empty folder or a new one");
-  write_bop_models(directory, options.parts, StructuredLight().camera, depth_scale_for(1500));
+  write_bop_models(directory, options.parts, options.cell ? options.cell->camera : StructuredLight().camera,
+                   depth_scale_for(1500));
   io::write_file(file, recipe.dump(1) + "\n");
 }
 
-/// The scene as a camera takes it, one diffuse bounce included.
 void write_frames_of(const DrawnScene& drawn, std::uint64_t seed, const fs::path& folder) {
-  RenderOptions render;
-  render.bounce_rays = 16;  // grain of 2 grey levels at most, and only where a bounce is strong; 10 s a scene
-  PatternOptions patterns;
-  patterns.width = render.projector_width;
-  patterns.height = render.projector_height;
-  patterns.period_px = drawn.sensor.fringe_period_px;
-  patterns.steps = drawn.sensor.steps;
-  render.patterns = make_patterns(patterns);
-  write_frames(folder, render_frames(drawn.bodies, drawn.sensor, render, seed));
-  write_rig(folder / "rig.json", rig_of(drawn.sensor, render));
+  const SceneFrames taken = frames_of(drawn, seed);
+  write_frames(folder, {taken.frames});
+  write_rig(folder / "rig.json", taken.rig);
 }
 
 // The rms over the image of a quadratic whose coefficients are drawn in [-1, 1] and scaled to a sum of 1, as
@@ -131,9 +139,9 @@ std::vector<PoseBound> bounds_of(const SimulatedScan& simulated, const DrawnScen
 /// Makes one scene and puts it in its place.
 void make_scene(const DatasetOptions& options, const SceneStock& stock, int scene, const fs::path& directory) {
   const LevelSettings& level = settings_of(options.level);
-  const std::uint64_t seed = mixed(options.seed * 1000003u + static_cast<std::uint64_t>(scene));
+  const std::uint64_t seed = seed_of_scene(options.seed, scene);
   DrawnScene drawn = options.kind == SceneKind::table ? draw_table_scene(stock, level, seed)
-                                                      : draw_bin_scene(stock, options.kind, level, seed);
+                                                      : draw_bin_scene(stock, options.kind, level, seed, options.cell);
   if (options.systematic) drawn.sensor.systematic = *options.systematic;
   if (options.scale_error > 0) drawn.sensor.scale = 1 + options.scale_error * Random(mixed(seed ^ 0x5CA1Eu)).normal();
   const SimulatedScan simulated = simulate_scan(drawn.bodies, drawn.sensor, seed);

@@ -7,6 +7,7 @@
 #include "sim/foreign_objects.hpp"
 #include "sim/random.hpp"
 #include "tribin/cad/measure.hpp"
+#include "tribin/core/error.hpp"
 #include "tribin/core/parallel.hpp"
 #include "tribin/sim/table_scene.hpp"
 
@@ -68,6 +69,8 @@ std::vector<double> drawn_albedos(std::size_t classes, Random& random) {
   return albedo;
 }
 
+constexpr double kPacking = 0.5;  // of the hulls of dropped parts
+
 struct Footprint {
   double length, width;
 };
@@ -77,7 +80,7 @@ struct Footprint {
 /// about half of their heap with their hulls.
 Footprint bin_for(const std::vector<const Solid*>& parts) {
   constexpr Footprint kSizes[] = {{160, 110}, {243, 162}, {346, 265}, {544, 364}, {750, 550}, {1150, 750}};
-  constexpr double kPacking = 0.5, kHighest = 0.45, kRoom = 1.15;
+  constexpr double kHighest = 0.45, kRoom = 1.15;
   double volume = 0, largest = 0;
   for (const Solid* p : parts) volume += p->hull_volume_mm3(), largest = std::max(largest, p->diameter_mm());
   for (const Footprint& f : kSizes)
@@ -104,6 +107,125 @@ double distance_above_bin(const Bin& bin, const PinholeCamera& camera, double ti
   };
   while (!fits()) distance *= 1.01;
   return distance;
+}
+
+/// What lies in a bin.
+struct Item {
+  const Solid* solid;
+  int object;  ///< BOP obj_id, 0 = foreign
+};
+struct Heap {
+  std::vector<Item> items;
+  int foreign = 0;
+  Footprint inside{};
+  BinFill fill;
+};
+
+std::vector<const Solid*> solids_of(const std::vector<Item>& items) {
+  std::vector<const Solid*> solids;
+  for (const Item& item : items) solids.push_back(item.solid);
+  return solids;
+}
+
+/// As many items as the bin holds, the first ones: by volume, then by what leans on the walls, which end at the rim.
+void fill_given_bin(const Bin& bin, Heap& heap, std::uint64_t seed) {
+  double room = kPacking * bin.length_mm * bin.width_mm * bin.height_mm;
+  std::size_t count = 0;
+  while (count < heap.items.size() && (room -= heap.items[count].solid->hull_volume_mm3()) >= 0) ++count;
+  for (bool fits = false; !fits; count -= (count + 3) / 4) {
+    if (count == 0 && !heap.items.empty())
+      throw Error(ErrorCode::out_of_range, "simulate: no part fits into the cell's bin of " +
+                                               std::to_string(std::lround(bin.length_mm)) + " x " +
+                                               std::to_string(std::lround(bin.width_mm)) + " x " +
+                                               std::to_string(std::lround(bin.height_mm)) + " mm; wanted a larger one");
+    heap.items.resize(count, Item{nullptr, 0});
+    heap.fill = fill_bin(solids_of(heap.items), bin.length_mm, bin.width_mm, seed);
+    fits = heap.fill.wall_contact_mm <= bin.height_mm;
+    if (fits) break;
+  }
+  heap.foreign = static_cast<int>(
+      std::count_if(heap.items.begin(), heap.items.end(), [](const Item& i) { return i.object == 0; }));
+}
+
+Heap draw_heap(const SceneStock& stock, SceneKind kind, const LevelSettings& level, Random& random,
+               const std::optional<CellView>& cell) {
+  Heap heap;
+  for (const int k : drawn_parts(level, stock.diameters_mm, random)) heap.items.push_back({&stock.solids[k], k + 1});
+  std::vector<const Solid*> solids = solids_of(heap.items);
+  if (kind != SceneKind::bin) heap.items.clear();  // the parts that are not there still tell how large the bin is
+  // Foreign objects fall at any time among the parts.
+  heap.foreign = kind == SceneKind::foreign ? random.integer(kFewestAlone, kMostAlone)
+                 : kind == SceneKind::empty || level.most_foreign == 0
+                     ? 0
+                     : random.integer(level.fewest_foreign, level.most_foreign);
+  for (int i = 0; i < heap.foreign; ++i) {
+    const Item item{&stock.foreign[random.integer(0, static_cast<int>(stock.foreign.size()) - 1)], 0};
+    heap.items.insert(heap.items.begin() + random.integer(0, static_cast<int>(heap.items.size())), item);
+    if (kind == SceneKind::bin) solids.push_back(item.solid);
+  }
+  if (cell) {
+    fill_given_bin(cell->bin, heap, random.bits());
+    return heap;
+  }
+  heap.inside = bin_for(solids);
+  heap.fill = fill_bin(solids_of(heap.items), heap.inside.length, heap.inside.width, random.bits());
+  return heap;
+}
+
+/// The bin and who looks at it.
+struct View {
+  Bin bin;
+  Pose camera_from_bin = Pose::Identity();
+  double distance_mm = 0;    ///< to the bin's floor, along the optical axis
+  double farthest_mm = 0;    ///< upper bound of depths
+  double table_side_mm = 0;  ///< cells only: a camera that looks aslant would see an endless table up to the horizon
+};
+
+// Sensors for larger bins have wider baselines: beyond 800 mm the angle between camera and projector stays.
+double baseline_scale(double distance_mm) { return std::max(1.0, distance_mm / 800); }
+
+View drawn_view(const Heap& heap, const LevelSettings& level, Random& random, StructuredLight& sensor) {
+  // The rim is as high as any part leans on the walls at least; bins are filled to the brim, or hardly half.
+  View view;
+  view.bin = {heap.inside.length, heap.inside.width, 0, 5};
+  Bin& bin = view.bin;
+  bin.height_mm = std::max({40.0, heap.fill.wall_contact_mm + 5, heap.fill.top_mm * random.uniform(0.7, 1.5)});
+  sensor = sensor_of(level, random);
+  Pose turned = Pose::Identity();  // bins stand nearly square to the camera, either way round
+  turned.linear() = rotation_from_vector(Vec3(0, 0, random.uniform(-5, 5) * kDegree + random.integer(0, 1) * kPi));
+  const double tilt = random.uniform(0, level.max_tilt), azimuth = random.uniform(0, 2 * kPi);
+  view.distance_mm = distance_above_bin(bin, sensor.camera, tilt, azimuth, turned);
+  view.camera_from_bin = camera_above(view.distance_mm, tilt, azimuth) * turned;
+  view.farthest_mm = 1.25 * view.distance_mm;
+  sensor.reference_mm = view.distance_mm - heap.fill.top_mm / 2;
+  sensor.baseline_mm *= baseline_scale(view.distance_mm);
+  return view;
+}
+
+View cell_view(const CellView& cell, const Heap& heap, const LevelSettings& level, Random& random,
+               StructuredLight& sensor) {
+  sensor = sensor_of(level, random);
+  sensor.camera = cell.camera;
+  if (cell.noise.sigma_mm > 0) sensor.noise_mm = cell.noise.sigma_mm;
+  if (cell.noise.correlation_px >= 0) sensor.noise_correlation_px = cell.noise.correlation_px;
+  const Vec3 floor = cell.camera_from_bin.translation();
+  const Vec2 pixel = floor.z() > 0 ? cell.camera.project(floor) : Vec2(-1, -1);
+  if (!(pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() < cell.camera.width && pixel.y() < cell.camera.height))
+    throw Error(ErrorCode::out_of_range,
+                "simulate: the camera of the cell does not see the middle of its bin's floor, which lies at " +
+                    std::to_string(floor.x()) + ", " + std::to_string(floor.y()) + ", " + std::to_string(floor.z()) +
+                    " mm in its frame; wanted it in view (camera.file, hand_eye, bin.base_from_bin)");
+  constexpr double kTableSides = 4;  // of the bin's length: what stands around a bin
+  View view{cell.bin, cell.camera_from_bin, floor.z(), 0,
+            kTableSides * std::max(cell.bin.length_mm, cell.bin.width_mm)};
+  for (int i = 0; i < 4; ++i) {
+    const double half = view.table_side_mm / 2;
+    const Vec3 corner = cell.camera_from_bin * Vec3(i & 1 ? half : -half, i & 2 ? half : -half, -cell.bin.wall_mm);
+    view.farthest_mm = std::max(view.farthest_mm, 1.25 * corner.z());
+  }
+  sensor.reference_mm = (cell.camera_from_bin * Vec3(0, 0, heap.fill.top_mm / 2)).z();
+  sensor.baseline_mm *= baseline_scale(view.distance_mm);
+  return view;
 }
 
 }  // namespace
@@ -157,70 +279,38 @@ DrawnScene draw_table_scene(const SceneStock& stock, const LevelSettings& level,
   return scene;
 }
 
-DrawnScene draw_bin_scene(const SceneStock& stock, SceneKind kind, const LevelSettings& level, std::uint64_t seed) {
+DrawnScene draw_bin_scene(const SceneStock& stock, SceneKind kind, const LevelSettings& level, std::uint64_t seed,
+                          const std::optional<CellView>& cell) {
   Random random(seed);
-  const std::vector<Mesh>& meshes = *stock.parts;
-  const std::vector<int> drawn = drawn_parts(level, stock.diameters_mm, random);
-  struct Item {
-    const Solid* solid;
-    int object;
-  };
-  std::vector<Item> items;
-  for (const int k : drawn) items.push_back({&stock.solids[k], k + 1});
-  std::vector<const Solid*> solids;
-  for (const Item& item : items) solids.push_back(item.solid);
-  if (kind != SceneKind::bin) items.clear();  // the parts that are not there still tell how large the bin is
-  // Foreign objects fall at any time among the parts.
-  const int foreign = kind == SceneKind::foreign ? random.integer(kFewestAlone, kMostAlone)
-                      : kind == SceneKind::empty || level.most_foreign == 0
-                          ? 0
-                          : random.integer(level.fewest_foreign, level.most_foreign);
-  for (int i = 0; i < foreign; ++i) {
-    const Item item{&stock.foreign[random.integer(0, static_cast<int>(stock.foreign.size()) - 1)], 0};
-    items.insert(items.begin() + random.integer(0, static_cast<int>(items.size())), item);
-    if (kind == SceneKind::bin) solids.push_back(item.solid);
-  }
-  const Footprint inside = bin_for(solids);
-  solids.clear();
-  for (const Item& item : items) solids.push_back(item.solid);
-  const BinFill fill = fill_bin(solids, inside.length, inside.width, random.bits());
-
-  // The rim is as high as any part leans on the walls at least; bins are filled to the brim, or hardly half.
-  Bin bin{inside.length, inside.width, 0, 5};
-  bin.height_mm = std::max({40.0, fill.wall_contact_mm + 5, fill.top_mm * random.uniform(0.7, 1.5)});
+  const Heap heap = draw_heap(stock, kind, level, random, cell);
   DrawnScene scene;
-  scene.sensor = sensor_of(level, random);
-  StructuredLight& sensor = scene.sensor;
-  Pose turned = Pose::Identity();  // bins stand nearly square to the camera, either way round
-  turned.linear() = rotation_from_vector(Vec3(0, 0, random.uniform(-5, 5) * kDegree + random.integer(0, 1) * kPi));
-  const double tilt = random.uniform(0, level.max_tilt), azimuth = random.uniform(0, 2 * kPi);
-  const double distance = distance_above_bin(bin, sensor.camera, tilt, azimuth, turned);
-  sensor.reference_mm = distance - fill.top_mm / 2;
-  // Sensors for larger bins have wider baselines: beyond 800 mm the angle between camera and projector stays.
-  sensor.baseline_mm *= std::max(1.0, distance / 800);
-  scene.camera_from_world = camera_above(distance, tilt, azimuth) * turned;
+  const View view =
+      cell ? cell_view(*cell, heap, level, random, scene.sensor) : drawn_view(heap, level, random, scene.sensor);
+  scene.camera_from_world = view.camera_from_bin;
 
-  scene.own = {bin_mesh(bin)};
+  scene.own = {bin_mesh(view.bin)};
+  if (cell) scene.own.push_back(table_mesh(view.table_side_mm));
   Pose below = Pose::Identity();
-  below.translation().z() = -bin.wall_mm - 1;  // under the bin's feet, so that the two planes do not fight
-  scene.bodies = {{&stock.table, scene.camera_from_world * below, kTableAlbedo, /*shine=*/0, /*counted=*/false},
+  below.translation().z() = -view.bin.wall_mm - 1;  // under the bin's feet, so that the two planes do not fight
+  scene.bodies = {{cell ? &scene.own[1] : &stock.table, scene.camera_from_world * below, kTableAlbedo, /*shine=*/0,
+                   /*counted=*/false},
                   {scene.own.data(), scene.camera_from_world, kBinAlbedo, /*shine=*/0, /*counted=*/false}};
   scene.object_of_body = {0, 0};
-  const std::vector<double> albedo = drawn_albedos(meshes.size(), random);
-  for (std::size_t i = 0; i < items.size(); ++i) {
-    const int k = items[i].object;
-    scene.bodies.push_back({&items[i].solid->mesh(), scene.camera_from_world * fill.bin_from_part[i],
+  const std::vector<double> albedo = drawn_albedos(stock.parts->size(), random);
+  for (std::size_t i = 0; i < heap.items.size(); ++i) {
+    const int k = heap.items[i].object;
+    scene.bodies.push_back({&heap.items[i].solid->mesh(), scene.camera_from_world * heap.fill.bin_from_part[i],
                             k > 0 ? albedo[k - 1] : random.uniform(0.1, 0.6), 1});
     scene.object_of_body.push_back(k);
   }
-  scene.largest_depth_mm = 1.25 * distance;
-  scene.info["distance_mm"] = distance;
-  scene.info["baseline_mm"] = sensor.baseline_mm;
-  scene.info["foreign"] = foreign;
-  scene.info["bin_inner_mm"] = {bin.length_mm, bin.width_mm, bin.height_mm};
-  scene.info["wall_mm"] = bin.wall_mm;
-  scene.info["max_overlap_mm"] = fill.max_overlap_mm;
-  scene.info["drift_mm"] = fill.drift_mm;
+  scene.largest_depth_mm = view.farthest_mm;
+  scene.info["distance_mm"] = view.distance_mm;
+  scene.info["baseline_mm"] = scene.sensor.baseline_mm;
+  scene.info["foreign"] = heap.foreign;
+  scene.info["bin_inner_mm"] = {view.bin.length_mm, view.bin.width_mm, view.bin.height_mm};
+  scene.info["wall_mm"] = view.bin.wall_mm;
+  scene.info["max_overlap_mm"] = heap.fill.max_overlap_mm;
+  scene.info["drift_mm"] = heap.fill.drift_mm;
   return scene;
 }
 

@@ -34,6 +34,10 @@ SceneStock make_stock(const std::vector<Mesh>& parts, SceneKind kind, const Leve
 
 DrawnScene draw_table_scene(const SceneStock& stock, const LevelSettings& level, std::uint64_t seed);
 /// \param kind  bin, empty or foreign.
-DrawnScene draw_bin_scene(const SceneStock& stock, SceneKind kind, const LevelSettings& level, std::uint64_t seed);
+/// \param cell  bin and camera of a work cell; without, they are drawn: a bin that the parts fill, seen wholly. A heap
+///              that would lean over the cell's rim gets fewer parts.
+/// \throws Error out_of_range where the cell's camera does not see its bin, or no part fits into it.
+DrawnScene draw_bin_scene(const SceneStock& stock, SceneKind kind, const LevelSettings& level, std::uint64_t seed,
+                          const std::optional<CellView>& cell = {});
 
 }  // namespace tribin::sim

@@ -157,6 +157,49 @@ class CaptureCommands(unittest.TestCase):
             self.assertIn(words, out.stderr)
 
 
+    def test_shots_are_replayed_with_the_same_bytes(self):
+        camera = {"cam_K": [200, 0, 79.5, 0, 200, 63.5, 0, 0, 1], "width": 160, "height": 128}
+        (WORK / "small_camera.json").write_text(json.dumps(camera))
+        box_stl(WORK / "block.stl", (30, 20, 12))
+        cell = WORK / "cell.toml"
+        text = ('[camera]\nfile = "small_camera.json"\nmount = "hand"\n[hand_eye]\nflange_from_camera = '
+                '{translation_mm = [0, 0, 50]}\n[bin]\ninner_size_mm = [160, 120, 60]\n'
+                '[[part]]\nname = "block"\ncad = "block.stl"\n')
+        cell.write_text(text)
+        pose = "yaskawa 0 0 500 180 0 0"
+        shutil.rmtree(WORK / "shots", ignore_errors=True)
+        shutil.rmtree(WORK / "cell_scenes", ignore_errors=True)
+        out = run("scan", f"sim:{cell}", "--base-from-flange", pose, "-o", WORK / "taken.pcd", "--record", WORK / "shots")
+        if "not built in" in out.stderr:
+            self.skipTest("SKIPPED: no simulation")
+        self.assertEqual(out.returncode, 0, out.stderr)
+        out = run("scan", WORK / "shots", "-o", WORK / "again.pcd")
+        self.assertEqual(out.returncode, 0, out.stderr)
+        for ending in [".pcd", ".taken.json"]:
+            self.assertEqual((WORK / ("taken" + ending)).read_bytes(), (WORK / ("again" + ending)).read_bytes())
+        out = run("scan", WORK / "shots", "-o", WORK / "again.pcd", "--base-from-flange", pose, "--flange-time",
+                  "2026-11-22T11:15:03.250Z")
+        self.assertEqual(out.returncode, 0, out.stderr)
+        self.assertIn("2026-11-22T11:15:03.250Z", (WORK / "again.taken.json").read_text())
+        out = run("simulate", cell, "--base-from-flange", pose, "-o", WORK / "cell_scenes")
+        self.assertEqual(out.returncode, 0, out.stderr)
+        self.assertIn("kind bin", out.stdout)
+        info = json.loads((WORK / "cell_scenes/scene_info.json").read_text())["1"]
+        self.assertEqual(info["bin_inner_mm"], [160, 120, 60])
+        for arguments, code, words in [
+            (["scan", f"sim:{cell}", "-o", WORK / "x.pcd"], 3, "base_from_flange"),
+            (["scan", f"sim:{WORK}/none.toml", "-o", WORK / "x.pcd"], 3, "none.toml"),
+            (["scan", WORK / "shots", "-o", WORK / "x.pcd", "--report", WORK / "x"], 2, "--report"),
+            (["scan", WORK / "shots", "-o", WORK / "x.pcd", "--base-from-flange", "kuka 1 2"], 2, "kuka"),
+            (["scan", WORK / "shots", "-o", WORK / "x.pcd", "--taken", "today"], 2, "--taken"),
+            (["simulate", cell, "--kind", "table", "-o", WORK / "x"], 3, "base_from_flange"),
+            (["simulate", "-o", WORK / "x"], 2, "--part"),
+        ]:
+            out = run(*arguments)
+            self.assertEqual((out.returncode, out.stderr.count("\n")), (code, 1), out.stderr)
+            self.assertIn(words, out.stderr)
+
+
 @unittest.skipUnless(SCENES.exists(), "SKIPPED: no shared data")
 class LocateCommand(unittest.TestCase):
     scene = SCENES / "test/000001"

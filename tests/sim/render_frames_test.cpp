@@ -163,7 +163,7 @@ TEST(RenderedFrames, AFolderOfThemIsAScan) {
   const RenderOptions options = with_patterns(PatternCode::micro);
   const std::vector<Body> bodies = {{&table, camera_above(800, 0.1, 1), 0.5, 0}};
   const FrameStack frames = render_frames(bodies, sensor, options, 5);
-  write_frames(folder, frames);
+  write_frames(folder, {frames});
   write_rig(folder / "rig.json", rig_of(sensor, options));
   const std::vector<FrameStack> read = read_frames(folder);
   ASSERT_EQ(read.size(), 1u);

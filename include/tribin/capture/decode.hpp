@@ -18,6 +18,7 @@ struct FrameStack {
   std::vector<Image<std::uint8_t>> grey8;
   std::vector<Image<std::uint16_t>> grey16;
   std::vector<std::string> files;  ///< names for messages; may be empty
+  double full_scale = 0;           ///< value that counts as saturated, 0 = 255 or 65535
   int projector_width = 0;         ///< of the patterns [px], 0 = not said
   int projector_height = 0;
 
@@ -29,7 +30,7 @@ struct FrameStack {
 struct DecodeOptions {
   double image_noise = 0;     ///< sd of a pixel [grey levels], 0 = from how well the frames follow a sinusoid
   double min_modulation = 0;  ///< [grey levels], 0 = 5 sd of the modulation that image noise alone makes
-  double full_scale = 0;      ///< camera value that counts as saturated; 0 = 255 or 65535 (set 4095 for raw 12 bit)
+  double full_scale = 0;      ///< camera value that counts as saturated; 0 = what the frames say
 };
 
 /// Where on the projector each camera pixel looks.

@@ -1,0 +1,45 @@
+#include "cell_view.hpp"
+
+#include "tribin/core/error.hpp"
+#include "tribin/core/log.hpp"
+#include "tribin/io/cad_files.hpp"
+#include "tribin/io/camera_file.hpp"
+
+namespace tribin::cli {
+
+WorkCell read_work_cell_logged(const std::filesystem::path& file) {
+  WorkCell cell = read_work_cell(file);
+  for (const std::string& warning : cell.warnings) log(LogLevel::warning, file.filename().string() + ": " + warning);
+  return cell;
+}
+
+std::vector<Mesh> meshes_of(const WorkCell& cell) {
+  if (cell.parts.empty())
+    throw Error(ErrorCode::bad_input, cell.file.string() + ": saw no [[part]], wanted one at least");
+  std::vector<Mesh> out;
+  for (const CellPart& part : cell.parts) {
+    out.push_back(read_cad(part.cad, {.unit = length_unit_from_name(part.unit)}));
+    out.back().name = part.name;
+  }
+  return out;
+}
+
+#ifdef TRIBIN_WITH_SIM
+sim::CellView cell_view_of(const WorkCell& cell, const std::optional<Pose>& base_from_flange) {
+  if (!cell.bin) throw Error(ErrorCode::bad_input, cell.file.string() + ": saw no [bin], wanted one to simulate");
+  const CameraFile camera = read_camera_file(cell.camera->file);
+  const std::string file = cell.camera->file.string();
+  if (camera.camera.width == 0 || camera.camera.height == 0)
+    throw Error(ErrorCode::bad_input, file + ": saw no width and height, wanted them to simulate the camera");
+  if (camera.distorted())
+    throw Error(ErrorCode::bad_input,
+                file + ": saw a lens distortion, wanted none: the simulated camera is a pinhole, as scans of rigs are");
+  const Vec3& size = cell.bin->inner_size_mm;
+  return {camera.camera,
+          camera.noise,
+          base_from_camera(cell, base_from_flange).inverse() * cell.bin->base_from_bin,
+          {size.x(), size.y(), size.z(), cell.bin->wall_mm}};
+}
+#endif
+
+}  // namespace tribin::cli
