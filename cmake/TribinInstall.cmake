@@ -9,7 +9,7 @@ install(TARGETS tribin EXPORT tribinTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_
         LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT dev)
 install(EXPORT tribinTargets NAMESPACE tribin:: DESTINATION ${TRIBIN_CONFIG_DIR} COMPONENT dev)
 set(TRIBIN_COMPONENTS)
-foreach(component cad_exchange calibration sim)
+foreach(component cad_exchange calibration sim genicam)
   if(TARGET tribin_${component})
     install(TARGETS tribin_${component} EXPORT tribin_${component}Targets
             ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT dev

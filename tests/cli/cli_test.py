@@ -157,6 +157,15 @@ class CaptureCommands(unittest.TestCase):
             self.assertIn(words, out.stderr)
 
 
+    def test_a_camera_that_is_not_there_is_exit_code_6(self):
+        out = run("scan", "genicam:nobody", "-o", WORK / "x.pcd")
+        if "not built in" in out.stderr:
+            self.assertEqual(out.returncode, 2)
+            self.assertIn("libaravis-dev", out.stderr)
+            return
+        self.assertEqual((out.returncode, out.stderr.count("\n")), (6, 1), out.stderr)
+        self.assertIn("genicam:nobody", out.stderr)
+
     def test_shots_are_replayed_with_the_same_bytes(self):
         camera = {"cam_K": [200, 0, 79.5, 0, 200, 63.5, 0, 0, 1], "width": 160, "height": 128}
         (WORK / "small_camera.json").write_text(json.dumps(camera))
