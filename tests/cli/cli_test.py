@@ -9,6 +9,7 @@ import pathlib
 import re
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -19,7 +20,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 DATA = pathlib.Path(os.environ.get("TRIBIN_DATA", ROOT / "../shared/data"))
 SCENES = DATA / "scenes_dev"
 COMMANDS = ["locate", "segment", "normals", "part", "convert", "patterns", "scan", "simulate", "simulate-controller",
-            "calibrate", "bop", "merge", "eval", "bench"]
+            "robot-server", "calibrate", "bop", "merge", "eval", "bench"]
 TRIBIN, WORK = sys.argv[1], pathlib.Path(sys.argv[2])
 
 
@@ -92,6 +93,45 @@ class Options(unittest.TestCase):
             self.assertEqual(out.stderr.count("\n"), 1, out.stderr)
             self.assertIn(pathlib.Path(arguments[1]).name, out.stderr)
             self.assertEqual(out.stdout, "")
+
+
+class Served:
+    """A command that serves until it is told to end; its port is in its first line."""
+
+    def __init__(self, *arguments):
+        self.process = subprocess.Popen([TRIBIN, *map(str, arguments)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self.first = self.process.stdout.readline()
+        self.port = int(re.search(r"port (\d+)", self.first).group(1)) if "port" in self.first else 0
+
+    def talk(self, text, until, timeout=120):
+        with socket.create_connection(("127.0.0.1", self.port), timeout=timeout) as link:
+            link.sendall(text.encode())
+            answer = b""
+            while until.encode() not in answer:
+                piece = link.recv(4096)
+                if not piece:
+                    break
+                answer += piece
+        return answer.decode()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.process.terminate()
+        self.process.communicate(timeout=20)
+
+
+class RobotCommands(unittest.TestCase):
+    def test_the_simulated_controller_speaks_host_control(self):
+        with Served("simulate-controller", "nx100", "--port", 0, "--start") as served:
+            answer = served.talk("CONNECT Robot_access Keep-Alive:-1\r\nHOSTCTRL_REQUEST RSTATS 0\r\n", "202,64")
+            self.assertEqual(answer, "OK: NX Information Server( 1.16) Keep-Alive:-1.\r\nOK: RSTATS\r\n202,64\r")
+        for arguments, words in [(["fanuc"], "nx100 or hses"), (["nx100", "--fault", "flood"], "delayed_answer"),
+                                 (["nx100", "--address", "nowhere"], "IPv4")]:
+            out = run("simulate-controller", *arguments, "--port", 0)
+            self.assertEqual((out.returncode, out.stderr.count("\n")), (2, 1), out.stderr)
+            self.assertIn(words, out.stderr)
 
 
 class PartCommand(unittest.TestCase):
@@ -221,6 +261,36 @@ class LocateCommand(unittest.TestCase):
         self.assertEqual(one.stdout, two.stdout)
         result = validated(self, "locate", one.stdout)
         self.assertEqual([i["part"] for i in result["instances"]], ["alternator_a"])
+
+    def test_the_robot_server_gives_the_same_pose(self):
+        cell = WORK / "server_cell.toml"
+        point = 'part_from_tcp = {rotation_deg = {convention = "yaskawa", values = [%d, 0, 0]}}'
+        cell.write_text(f"""[camera]
+file = "{self.scene.resolve()}/scene_camera.json"
+[hand_eye]
+base_from_camera = {{translation_mm = [100, 200, 900], rotation_deg = {{convention = "yaskawa", values = [180, 0, 0]}}}}
+[[part]]
+name = "alternator_a"
+cad = "{SCENES.resolve()}/cad/alternator_a.stl"
+max_tilt_deg = 90
+pick_points = [{{{point % 0}}}, {{{point % 180}}}]
+[safety]
+workspace_mm = {{min = [-5000, -5000, -5000], max = [5000, 5000, 5000]}}
+scan_max_age_s = 100
+""")
+        found = json.loads(run(*self.arguments, "--json", "-").stdout)["instances"][0]
+        x, y, z = found["camera_from_part"]["translation_mm"]
+        with Served("robot-server", "--workcell", cell, "--scan", self.scene / "depth/000000.png", "--port", 0, "--any-age") as served:
+            self.assertNotEqual(served.port, 0, served.first)
+            answer = served.talk("HELLO,1,kuka\r\nSCAN\r\nGET,3\r\nBYE\r\n", "202\r\n")
+        lines = answer.split("\r\n")
+        self.assertEqual(lines[:3], ["100,1,tribin", "201,1,1", "200,1,3,0"], answer)
+        pose = [float(v) for v in lines[4].split(",")[4:]]
+        for seen, wanted in zip(pose, (x + 100, 200 - y, 900 - z)):
+            self.assertAlmostEqual(seen, wanted, delta=0.002)
+        no_time = Served("robot-server", "--workcell", cell, "--scan", self.scene / "depth/000000.png", "--port", 0)
+        with no_time as served:  # motion goes by a scan whose age is known only
+            self.assertIn("500,", served.talk("HELLO,1,kuka\r\nSCAN\r\nBYE\r\n", "202\r\n"))
 
     def test_a_kept_part_is_found_as_one_that_is_compiled_now(self):
         kept, compiled = run(*self.arguments, "--json", "-"), run(*self.arguments, "--json", "-", "--no-cache")

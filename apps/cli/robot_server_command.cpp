@@ -1,0 +1,164 @@
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <thread>
+
+#include "commands.hpp"
+#include "tribin/config/work_cell.hpp"
+#include "tribin/core/error.hpp"
+#include "tribin/core/log.hpp"
+#include "tribin/finder/finder.hpp"
+#include "tribin/robot/text_protocol.hpp"
+
+namespace tribin::cli {
+namespace {
+
+using robot::TextPick;
+using robot::TextScene;
+using robot::TextStatus;
+
+struct Options {
+  std::string cell, scan, address = "127.0.0.1", key, scan_unit = "auto";
+  int port = 7000;
+  double seconds = 0;
+  bool any_age = false, allow_remote = false, no_cache = false;
+};
+
+constexpr double kApproach_mm = 100;  // before the pick, back along the tool
+constexpr double kLift_mm = 150;      // after it, straight up
+
+std::int64_t now_ms() {
+  return std::chrono::duration_cast<std::chrono::milliseconds>(std::chrono::system_clock::now().time_since_epoch())
+      .count();
+}
+
+/// The best taught pick point of one part in one of its equivalent poses: greatest priority, then least tilt.
+std::optional<TextPick> taught_pick(const CellPart& part, const std::vector<Pose>& base_from_part) {
+  std::optional<TextPick> best;
+  double best_priority = 0, best_tilt = 0;
+  for (const PickPoint& point : part.pick_points)
+    for (const Pose& pose : base_from_part) {
+      const Pose at = pose * point.part_from_tcp;
+      const double tilt = std::acos(std::clamp(-at.linear()(2, 2), -1.0, 1.0));  // of the approach to straight down
+      if (tilt > part.max_tilt_rad) continue;
+      if (best && (point.priority < best_priority || (point.priority == best_priority && tilt >= best_tilt))) continue;
+      TextPick pick;
+      pick.pick.fill(at);
+      pick.pick[0].translation() -= kApproach_mm * at.linear().col(2);
+      pick.pick[2].translation().z() += kLift_mm;
+      best = pick;
+      best_priority = point.priority;
+      best_tilt = tilt;
+    }
+  return best;
+}
+
+class Vision {
+ public:
+  Vision(const Options& options, const WorkCell& cell) : options_(options), cell_(cell) {
+    for (const CellPart& part : cell.parts)
+      for (Part& read : read_parts({{part.name, part.cad}}, part.unit, options.no_cache))
+        parts_.push_back(std::move(read));
+  }
+
+  TextScene look() const {
+    const Scan scan = read_scan_logged(options_.scan, cell_.camera->file.string(), options_.scan_unit);
+    const std::optional<std::int64_t> now = options_.any_age ? std::nullopt : std::optional(now_ms());
+    const Pose base_from_input = base_from_camera(cell_, scan.taken, options_.scan, now);
+    const Found found = find_parts(scan, parts_);
+    TextScene scene;
+    scene.status = found.status == "empty"         ? TextStatus::bin_empty
+                   : found.instances.items.empty() ? TextStatus::no_object
+                                                   : TextStatus::not_pickable;
+    for (const Instance& instance : found.instances.items) {
+      const auto part = std::find_if(cell_.parts.begin(), cell_.parts.end(),
+                                     [&](const CellPart& p) { return p.name == instance.part; });
+      const Pose base_from_scan = base_from_input * scan.input_from_camera;
+      std::vector<Pose> poses{base_from_scan * instance.camera_from_part};
+      for (const Pose& other : instance.equivalent_poses) poses.push_back(base_from_scan * other);
+      if (std::optional<TextPick> pick = taught_pick(*part, poses)) {
+        pick->id = instance.id;
+        pick->part_class = static_cast<int>(part - cell_.parts.begin()) + 1;
+        scene.picks.push_back(*pick);
+        scene.status = TextStatus::scanned;
+      }
+    }
+    return scene;
+  }
+
+ private:
+  const Options& options_;
+  const WorkCell& cell_;
+  std::vector<Part> parts_;
+};
+
+robot::TextOptions text_options(const Options& options, const WorkCell& cell) {
+  robot::TextOptions out;
+  out.key = options.key;
+  out.limits.allow_remote_clients = options.allow_remote;
+  out.limits.scan_max_age_s = cell.safety.scan_max_age_s;
+  if (cell.safety.workspace_mm)
+    out.limits.workspace = robot::Box{cell.safety.workspace_mm->min, cell.safety.workspace_mm->max};
+  for (const CellRange& box : cell.safety.forbidden_mm) out.limits.forbidden.push_back({box.min, box.max});
+  return out;
+}
+
+int run(const Options& options, const Context&) {
+  const WorkCell cell = read_work_cell(options.cell);
+  for (const std::string& warning : cell.warnings) log(LogLevel::warning, warning);
+  if (cell.parts.empty()) throw Error(ErrorCode::bad_input, options.cell + ": saw no [[part]], wanted at least one");
+  if (!cell.safety.workspace_mm)
+    throw Error(ErrorCode::bad_input,
+                options.cell + ": saw no safety.workspace_mm, wanted the box in which poses may be given out");
+  for (const CellPart& part : cell.parts)
+    if (part.pick_points.empty())
+      log(LogLevel::warning, "part " + part.name + " has no pick_points: it is found, and never given out");
+  const Vision vision(options, cell);
+  robot::TextVision callbacks;
+  callbacks.scan = [&vision] { return vision.look(); };
+  callbacks.report = [](int scene, const TextPick& pick, int result) {
+    log(LogLevel::info,
+        "scene " + std::to_string(scene) + ", pick " + std::to_string(pick.id) + ": result " + std::to_string(result));
+  };
+  const robot::TextServer server(callbacks, text_options(options, cell), options.address, options.port);
+  std::printf("robot-server at %s, port %d; Ctrl-C ends it\n", options.address.c_str(), server.port());
+  std::fflush(stdout);
+  const auto begin = std::chrono::steady_clock::now();
+  while (options.seconds == 0 ||
+         std::chrono::steady_clock::now() - begin < std::chrono::duration<double>(options.seconds))
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  return 0;
+}
+
+}  // namespace
+
+void add_robot_server(CLI::App& app, Context& context) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command =
+      add_command(app, context, "robot-server", "Give poses to a robot program of any brand, as lines of text",
+                  "tribin robot-server --workcell cell.toml --scan bin.pcd --port 7000");
+  command->add_option("--workcell", options->cell, "Camera, hand-eye, parts with their pick points, workspace")
+      ->required()
+      ->type_name("TOML");
+  command->add_option("--scan", options->scan, "Read anew at each request of the robot: the camera's program writes it")
+      ->required()
+      ->type_name("SCAN");
+  command->add_option("--scan-unit", options->scan_unit, "Of clouds: auto, mm, m")->type_name("U");
+  command->add_option("--port", options->port, "0 = any free one")->check(CLI::Range(0, 65535))->type_name("N");
+  command
+      ->add_option("--address", options->address,
+                   "Where to listen; others than this machine need --allow-remote and --key")
+      ->type_name("IP");
+  command->add_flag("--allow-remote", options->allow_remote, "Robots on the network may ask, with the key");
+  command->add_option("--key", options->key, "That robot programs show in HELLO")->type_name("KEY");
+  command->add_flag("--any-age", options->any_age,
+                    "For trials with recorded scans: take one however old, or without a time");
+  command->add_option("--seconds", options->seconds, "End after that time; 0 = never")
+      ->check(CLI::Range(0.0, 1e6))
+      ->type_name("S");
+  add_no_cache(command, options->no_cache);
+  command->callback([options, &context] { context.run = [options, &context] { return run(*options, context); }; });
+}
+
+}  // namespace tribin::cli
