@@ -9,6 +9,7 @@
 #include "tribin/core/error.hpp"
 #include "tribin/core/log.hpp"
 #include "tribin/finder/finder.hpp"
+#include "tribin/robot/cell_limits.hpp"
 #include "tribin/robot/text_protocol.hpp"
 
 namespace tribin::cli {
@@ -96,11 +97,8 @@ class Vision {
 robot::TextOptions text_options(const Options& options, const WorkCell& cell) {
   robot::TextOptions out;
   out.key = options.key;
+  out.limits = robot::limits_of(cell);
   out.limits.allow_remote_clients = options.allow_remote;
-  out.limits.scan_max_age_s = cell.safety.scan_max_age_s;
-  if (cell.safety.workspace_mm)
-    out.limits.workspace = robot::Box{cell.safety.workspace_mm->min, cell.safety.workspace_mm->max};
-  for (const CellRange& box : cell.safety.forbidden_mm) out.limits.forbidden.push_back({box.min, box.max});
   return out;
 }
 

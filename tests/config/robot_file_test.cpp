@@ -6,8 +6,10 @@
 
 #include "support/arms.hpp"
 #include "support/temporary_folder.hpp"
+#include "tribin/config/work_cell.hpp"
 #include "tribin/core/error.hpp"
 #include "tribin/kinematics/inverse.hpp"
+#include "tribin/robot/cell_limits.hpp"
 
 namespace tribin {
 namespace {
@@ -30,6 +32,17 @@ TEST(RobotFiles, OfTheExamplesAreRead) {
     }
     EXPECT_THROW(arm_called(robot, "R9"), Error);
   }
+}
+
+TEST(RobotFiles, TheSampleCellNamesOneThatIsThere) {
+  const WorkCell cell = read_work_cell(std::filesystem::path(TRIBIN_SOURCE_DIR) / "examples/cells/bench_cell.toml");
+  ASSERT_FALSE(cell.robots.empty());
+  EXPECT_EQ(read_robot(cell.robots[0].model).name, "SDA20D");
+  const robot::SafetyLimits limits = robot::limits_of(cell);
+  EXPECT_FALSE(limits.allow_arm);
+  EXPECT_EQ(limits.speed_mm_s, 250);
+  ASSERT_TRUE(limits.workspace);
+  EXPECT_EQ(limits.workspace->max.x(), 1500);
 }
 
 TEST(RobotFiles, Gp110IsTheArmOfTheTests) {

@@ -143,6 +143,25 @@ TEST_P(Handshake, SurvivesRandomFaultsWithoutADoubleMotion) {
   }
 }
 
+TEST(HandshakeJudge, SeesTheSecondMotionOfAClientThatSendsAgain) {
+  Cell cell("nx100");
+  // The job without its own guard, and a client that takes silence for a loss.
+  std::string job = handshake_job();
+  for (std::size_t at; (at = job.find("JUMP *STALE IF I000=I002\n")) != std::string::npos;) job.erase(at, 25);
+  cell.machine.add_job(parse_job(job, "BPICK"));
+  cell.machine.hold(true);
+  cell.machine.hold(false);
+  cell.machine.start("BPICK");
+  const auto order = test::random_order(1, cell.random);
+  EXPECT_EQ(run_cycle(*cell.client, cell.clock, order), CycleResult::done);
+  cell.client->write_byte(0, 1);
+  cell.clock.sleep_s(20);
+  cell.client->status();
+  test::CampaignCounts counts;
+  test::MotionJudge(cell.machine).judge(order, true, counts);
+  EXPECT_EQ(counts.double_motions, 3);
+}
+
 INSTANTIATE_TEST_SUITE_P(Protocols, Handshake, testing::Values("nx100", "hses"),
                          [](const auto& info) { return info.param; });
 
