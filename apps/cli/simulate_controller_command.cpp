@@ -6,8 +6,10 @@
 #include <thread>
 
 #include "commands.hpp"
+#include "tribin/config/robot_file.hpp"
 #include "tribin/controller_sim/server.hpp"
 #include "tribin/core/error.hpp"
+#include "tribin/kinematics/inverse.hpp"
 
 namespace tribin::cli {
 namespace {
@@ -15,7 +17,7 @@ namespace {
 using namespace controller_sim;
 
 struct Options {
-  std::string protocol, address = "127.0.0.1", log;
+  std::string protocol, address = "127.0.0.1", log, robot, arm = "R1";
   int port = -1;
   std::vector<std::string> faults, jobs;
   double rate = 1, scale = 1, seconds = 0;
@@ -52,6 +54,14 @@ robot::ByteSink sink_into(std::ostream& out) {
   };
 }
 
+/// Poses that an arm reaches inside its limits, the tool taken as the flange and the waist at 0.
+std::function<bool(const Pose&)> reach_of(const Options& options) {
+  const robot::RobotModel model = read_robot(options.robot);
+  const robot::Arm arm = arm_called(model, options.arm);
+  const Pose arm_from_base = base_from_arm(model, arm).inverse();
+  return [arm, arm_from_base](const Pose& pose) { return reach(arm, arm_from_base * pose).has_value(); };
+}
+
 int run(const Options& options, const Context&) {
   if (options.protocol != "nx100" && options.protocol != "hses")
     throw Error(ErrorCode::bad_option, options.protocol + ": wanted nx100 or hses");
@@ -65,6 +75,7 @@ int run(const Options& options, const Context&) {
   behaviour.on_output = [](Machine& machine, int output, bool on) {
     if (output == 1) machine.set_input(1, on);
   };
+  if (!options.robot.empty()) behaviour.reachable = reach_of(options);
   Machine machine(behaviour);
   machine.add_job(parse_job(handshake_job(), "BPICK"));
   for (const std::string& job : options.jobs) machine.add_job(read_job(job));
@@ -110,6 +121,9 @@ void add_simulate_controller(CLI::App& app, Context& context) {
   command->add_option("--job", options->jobs, "Job files beside the hand-shake job BPICK")
       ->type_name("JBI")
       ->allow_extra_args(false);
+  command->add_option("--robot", options->robot, "Poses out of its reach raise an alarm; without it all are reached")
+      ->type_name("TOML");
+  command->add_option("--arm", options->arm, "Of the robot")->type_name("NAME");
   command->add_flag("--start", options->start, "BPICK runs from the beginning");
   command->add_flag("--four-decimals", options->dx, "Angles with four decimals, as DX100 and later");
   command

@@ -127,6 +127,9 @@ class RobotCommands(unittest.TestCase):
         with Served("simulate-controller", "nx100", "--port", 0, "--start") as served:
             answer = served.talk("CONNECT Robot_access Keep-Alive:-1\r\nHOSTCTRL_REQUEST RSTATS 0\r\n", "202,64")
             self.assertEqual(answer, "OK: NX Information Server( 1.16) Keep-Alive:-1.\r\nOK: RSTATS\r\n202,64\r")
+        unfilled = run("simulate-controller", "nx100", "--robot", ROOT / "examples/robots/da20.toml", "--port", 0)
+        self.assertEqual((unfilled.returncode, unfilled.stderr.count("\n")), (3, 1))
+        self.assertIn("to be filled in", unfilled.stderr)
         for arguments, words in [(["fanuc"], "nx100 or hses"), (["nx100", "--fault", "flood"], "delayed_answer"),
                                  (["nx100", "--address", "nowhere"], "IPv4")]:
             out = run("simulate-controller", *arguments, "--port", 0)

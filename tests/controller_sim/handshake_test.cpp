@@ -1,9 +1,13 @@
 #include <gtest/gtest.h>
 
+#include <fstream>
+#include <iterator>
+
 #include "support/handshake_campaign.hpp"
 #include "tribin/controller_sim/virtual_link.hpp"
 #include "tribin/robot/hses.hpp"
 #include "tribin/robot/nx100.hpp"
+#include "tribin/robot/safety.hpp"
 
 namespace tribin {
 namespace {
@@ -141,6 +145,43 @@ TEST_P(Handshake, SurvivesRandomFaultsWithoutADoubleMotion) {
     EXPECT_EQ(counts.hangs, 0);
     EXPECT_GT(counts.done, 90);
   }
+}
+
+TEST(HandshakeOfArm2, UsesVariablesOfItsOwn) {
+  MachineOptions behaviour;
+  behaviour.on_output = [](Machine& m, int output, bool on) {
+    if (output == 2) m.set_input(2, on);
+  };
+  Machine machine(behaviour);
+  std::ifstream file(std::string(TRIBIN_SOURCE_DIR) + "/examples/robots/BPICK2.JBI", std::ios::binary);
+  machine.add_job(parse_job(std::string(std::istreambuf_iterator<char>(file), {}), "BPICK2.JBI"));
+  ASSERT_EQ(machine.start("BPICK2"), 0);
+  Wire wire(machine, {});
+  VirtualClock clock;
+  const auto client = robot::make_nx100(virtual_stream(wire, clock), clock);
+  robot::HandshakeOptions options;
+  options.variables = {10, 10, 20};
+  std::mt19937_64 random(1);
+  for (int cycle = 1; cycle <= 4; ++cycle)
+    EXPECT_EQ(run_cycle(*client, clock, test::random_order(cycle, random), options), CycleResult::done);
+  EXPECT_EQ(machine.integers[12], 4);
+  EXPECT_EQ(machine.integers[2], 0);
+  EXPECT_EQ(machine.moves().front().index, 21);
+}
+
+TEST(HandshakeBehindTheGate, RunsWithConsentAndNotOutsideTheWorkspace) {
+  Cell cell("nx100");
+  robot::SafetyLimits limits;
+  limits.allow_arm = true;
+  limits.workspace = robot::Box{Vec3(300, -400, 0), Vec3(900, 400, 600)};
+  limits.tools = {1};
+  const auto guarded = robot::make_guarded(std::move(cell.client), limits, /*arm=*/true);
+  auto order = test::random_order(1, cell.random);
+  EXPECT_EQ(run_cycle(*guarded, cell.clock, order), CycleResult::done);
+  order.cycle = 2;
+  order.positions[1].numbers[2] = -5;
+  EXPECT_THROW(run_cycle(*guarded, cell.clock, order), ControllerError);
+  EXPECT_EQ(cell.machine.moves().size(), 3u);
 }
 
 TEST(HandshakeJudge, SeesTheSecondMotionOfAClientThatSendsAgain) {
