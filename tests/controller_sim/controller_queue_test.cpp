@@ -16,22 +16,23 @@ namespace {
 using namespace controller_sim;
 
 struct QueueTest : testing::Test {
-  QueueTest() {
-    machine.add_job(parse_job(handshake_job(), "BPICK"));
-    machine.start("BPICK");
-  }
   std::unique_ptr<robot::ControllerQueue> queue(double idle_s) {
     return robot::make_queue(robot::make_nx100(robot::tcp_stream("127.0.0.1", server.port(), *clock), *clock), *clock,
                              {idle_s});
   }
   std::unique_ptr<robot::Clock> clock = robot::make_clock(2);
-  Machine machine{[] {
+  // Ready before the server's thread sees it.
+  static Machine running_machine() {
     MachineOptions options;
     options.on_output = [](Machine& m, int output, bool on) {
       if (output == 1) m.set_input(1, on);
     };
-    return options;
-  }()};
+    Machine machine(options);
+    machine.add_job(parse_job(handshake_job(), "BPICK"));
+    machine.start("BPICK");
+    return machine;
+  }
+  Machine machine = running_machine();
   Wire wire{machine, {}};
   Server server{wire, *clock, {}};
 };
