@@ -4,11 +4,12 @@
 #include <cstdio>
 #include <thread>
 
-#include "commands.hpp"
+#include "camera_source.hpp"
 #include "tribin/config/work_cell.hpp"
 #include "tribin/core/error.hpp"
 #include "tribin/core/log.hpp"
 #include "tribin/finder/finder.hpp"
+#include "tribin/io/rig_file.hpp"
 #include "tribin/robot/cell_limits.hpp"
 #include "tribin/robot/text_protocol.hpp"
 
@@ -20,7 +21,8 @@ using robot::TextScene;
 using robot::TextStatus;
 
 struct Options {
-  std::string cell, scan, address = "127.0.0.1", key, scan_unit = "auto";
+  SourceArguments from;
+  std::string cell, calibration, address = "127.0.0.1", key, scan_unit = "auto";
   int port = 7000;
   double seconds = 0;
   bool any_age = false, allow_remote = false, no_cache = false;
@@ -28,11 +30,6 @@ struct Options {
 
 constexpr double kApproach_mm = 100;  // before the pick, back along the tool
 constexpr double kLift_mm = 150;      // after it, straight up
-
-std::int64_t now_ms() {
-  return std::chrono::duration_cast<std::chrono::milliseconds>(std::chrono::system_clock::now().time_since_epoch())
-      .count();
-}
 
 /// The best taught pick point of one part in one of its equivalent poses: greatest priority, then least tilt.
 std::optional<TextPick> taught_pick(const CellPart& part, const std::vector<Pose>& base_from_part) {
@@ -61,12 +58,15 @@ class Vision {
     for (const CellPart& part : cell.parts)
       for (Part& read : read_parts({{part.name, part.cad}}, part.unit, options.no_cache))
         parts_.push_back(std::move(read));
+    if (std::filesystem::is_regular_file(options.from.source)) return;  // a scan, read anew each time
+    if (!options.calibration.empty()) rig_ = read_rig(options.calibration, options.from.source);
+    camera_ = open_source(options.from);
   }
 
   TextScene look() const {
-    const Scan scan = read_scan_logged(options_.scan, cell_.camera->file.string(), options_.scan_unit);
+    const Scan scan = take();
     const std::optional<std::int64_t> now = options_.any_age ? std::nullopt : std::optional(now_ms());
-    const Pose base_from_input = base_from_camera(cell_, scan.taken, options_.scan, now);
+    const Pose base_from_input = base_from_camera(cell_, scan.taken, options_.from.source, now);
     const Found found = find_parts(scan, parts_);
     TextScene scene;
     scene.status = found.status == "empty"         ? TextStatus::bin_empty
@@ -89,9 +89,20 @@ class Vision {
   }
 
  private:
+  Scan take() const {
+    if (!camera_) return read_scan_logged(options_.from.source, cell_.camera->file.string(), options_.scan_unit);
+    Shot shot = camera_->grab();
+    apply_taken(options_.from, shot);
+    Scan scan = scan_of(std::move(shot), rig_).result.scan;
+    for (const std::string& warning : scan.warnings) log(LogLevel::warning, warning);
+    return scan;
+  }
+
   const Options& options_;
   const WorkCell& cell_;
   std::vector<Part> parts_;
+  std::optional<Rig> rig_;
+  std::unique_ptr<Camera> camera_;
 };
 
 robot::TextOptions text_options(const Options& options, const WorkCell& cell) {
@@ -135,13 +146,17 @@ void add_robot_server(CLI::App& app, Context& context) {
   auto options = std::make_shared<Options>();
   CLI::App* command =
       add_command(app, context, "robot-server", "Give poses to a robot program of any brand, as lines of text",
-                  "tribin robot-server --workcell cell.toml --scan bin.pcd --port 7000");
+                  "tribin robot-server bin.pcd --workcell cell.toml --port 7000");
   command->add_option("--workcell", options->cell, "Camera, hand-eye, parts with their pick points, workspace")
       ->required()
       ->type_name("TOML");
-  command->add_option("--scan", options->scan, "Read anew at each request of the robot: the camera's program writes it")
-      ->required()
-      ->type_name("SCAN");
+  options->from.source = "genicam";
+  add_source_arguments(command, options->from, context);
+  command->get_option("SOURCE")->required(false)->description(
+      "A scan file, read anew at each request; or a camera as of tribin scan: FRAMES_DIR, sim:CELL.toml, genicam[:ID] "
+      "(default)");
+  command->add_option("--calibration", options->calibration, "rig.json of a camera that gives frames")
+      ->type_name("FILE");
   command->add_option("--scan-unit", options->scan_unit, "Of clouds: auto, mm, m")->type_name("U");
   command->add_option("--port", options->port, "0 = any free one")->check(CLI::Range(0, 65535))->type_name("N");
   command

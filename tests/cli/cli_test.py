@@ -283,7 +283,7 @@ scan_max_age_s = 100
 """)
         found = json.loads(run(*self.arguments, "--json", "-").stdout)["instances"][0]
         x, y, z = found["camera_from_part"]["translation_mm"]
-        with Served("robot-server", "--workcell", cell, "--scan", self.scene / "depth/000000.png", "--port", 0, "--any-age") as served:
+        with Served("robot-server", self.scene / "depth/000000.png", "--workcell", cell, "--port", 0, "--any-age") as served:
             self.assertNotEqual(served.port, 0, served.first)
             answer = served.talk("HELLO,1,kuka\r\nSCAN\r\nGET,3\r\nBYE\r\n", "202\r\n")
         lines = answer.split("\r\n")
@@ -291,7 +291,7 @@ scan_max_age_s = 100
         pose = [float(v) for v in lines[4].split(",")[4:]]
         for seen, wanted in zip(pose, (x + 100, 200 - y, 900 - z)):
             self.assertAlmostEqual(seen, wanted, delta=0.002)
-        no_time = Served("robot-server", "--workcell", cell, "--scan", self.scene / "depth/000000.png", "--port", 0)
+        no_time = Served("robot-server", self.scene / "depth/000000.png", "--workcell", cell, "--port", 0)
         with no_time as served:  # motion goes by a scan whose age is known only
             self.assertIn("500,", served.talk("HELLO,1,kuka\r\nSCAN\r\nBYE\r\n", "202\r\n"))
 
