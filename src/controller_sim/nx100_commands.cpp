@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "tribin/controller_sim/sessions.hpp"
 #include "tribin/robot/nx100.hpp"
@@ -260,11 +261,18 @@ std::optional<CommandAnswer> read_answer(Wire& wire, const std::string& command,
 
 }  // namespace
 
-CommandAnswer nx100_answer(Wire& wire, const std::string& command, const std::string& data, std::optional<Fault> fault,
-                           bool& known) {
+bool is_nx100_command(std::string_view name) {
+  constexpr std::string_view kCommands[] = {
+      "RALARM", "RPOSJ", "RPOSC",  "RSTATS",  "RJSEQ", "JWAIT", "RGROUP", "RJDIR", "RUFRAME", "SAVEV", "IOREAD",
+      "SVON",   "HOLD",  "RESET",  "CANCEL",  "MODE",  "CYCLE", "HLOCK",  "MDSP",  "CGROUP",  "CTASK", "START",
+      "JSEQ",   "SETMJ", "DELETE", "WUFRAME", "MOVJ",  "MOVL",  "IMOV",   "PMOVJ", "PMOVL",   "LOADV", "IOWRITE"};
+  return std::find(std::begin(kCommands), std::end(kCommands), name) != std::end(kCommands);
+}
+
+CommandAnswer nx100_answer(Wire& wire, const std::string& command, const std::string& data,
+                           std::optional<Fault> fault) {
   Machine& m = wire.machine;
   const Numbers n = nx100::numbers_of(data);
-  known = true;
   if (std::optional<CommandAnswer> answer = read_answer(wire, command, data, n, fault)) {
     if (fault == Fault::blanks)
       for (std::size_t at = 0; (at = answer->data.find(',', at)) != std::string::npos; at += 2)
@@ -300,7 +308,6 @@ CommandAnswer nx100_answer(Wire& wire, const std::string& command, const std::st
     if (command == "HOLD") return done(m.hold(*value == 1));
     return done(0);
   }
-  known = false;
   return refused(1010);
 }
 

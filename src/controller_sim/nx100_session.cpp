@@ -100,13 +100,7 @@ void Nx100Session::line(const std::string& text) {
     return close();
   }
   fault_ = wire_.dice.throw_dice();
-  bool known = false;
-  static const char* const kCommands[] = {
-      "RALARM", "RPOSJ", "RPOSC",  "RSTATS",  "RJSEQ", "JWAIT", "RGROUP", "RJDIR", "RUFRAME", "SAVEV", "IOREAD",
-      "SVON",   "HOLD",  "RESET",  "CANCEL",  "MODE",  "CYCLE", "HLOCK",  "MDSP",  "CGROUP",  "CTASK", "START",
-      "JSEQ",   "SETMJ", "DELETE", "WUFRAME", "MOVJ",  "MOVL",  "IMOV",   "PMOVJ", "PMOVL",   "LOADV", "IOWRITE"};
-  for (const char* const command : kCommands) known = known || name == command;
-  if (fault_ == Fault::ng || (!known && wire_.unknown_is_ng)) {
+  if (fault_ == Fault::ng || (wire_.unknown_is_ng && !is_nx100_command(name))) {
     send("NG: " + name + "\r\n");
     return close();
   }
@@ -141,8 +135,7 @@ void Nx100Session::start(const std::string& text) {
 }
 
 void Nx100Session::command(const std::string& name, const std::string& data, bool with_data) {
-  bool known = true;
-  const CommandAnswer answer = nx100_answer(wire_, name, data, fault_, known);
+  const CommandAnswer answer = nx100_answer(wire_, name, data, fault_);
   ++wire_.commands;
   ++commands_;
   if (fault_ == Fault::drop_after) return close();

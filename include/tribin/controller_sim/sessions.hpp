@@ -63,9 +63,8 @@ struct CommandAnswer {
   std::string data;    ///< empty = 0000
   double delay_s = 0;  ///< of JWAIT
 };
-/// \param known  set to whether there is such a command
-CommandAnswer nx100_answer(Wire& wire, const std::string& command, const std::string& data, std::optional<Fault> fault,
-                           bool& known);
+CommandAnswer nx100_answer(Wire& wire, const std::string& command, const std::string& data, std::optional<Fault> fault);
+bool is_nx100_command(std::string_view name);
 
 /// Answers to a packet of HSES; empty for what is no packet. \param file_port  whether it came to port 10041
 std::vector<Chunk> hses_answer(Wire& wire, std::string_view packet, bool file_port = false);
