@@ -16,12 +16,17 @@ namespace ppf = cv::ppf_match_3d;
 
 // Its sample's own settings: model sampled at 0.05 of the diameter, every fifth scene point a reference.
 constexpr double kModelStep = 0.05, kSceneStep = 1.0 / 5, kSceneDistance = 0.05;
-constexpr std::size_t kRefined = 40;       // poses that ICP gets: twice as many as parts lie in a dense heap
+constexpr std::size_t kRefined = 30;  // poses that ICP gets: more than parts of one class lie in a dense heap
+constexpr int kModelPoints = 3000;    // it samples anew at 0.05 of the diameter; ICP takes all that it is given
+constexpr int kScenePoints = 30000;
 constexpr double kLeastVotesOfBest = 0.3;  // poses with fewer votes than this share of the best are not given out
 
-cv::Mat points_of(const std::vector<float>& values, int every) {
+/// At most about `most` of the points, evenly by their order.
+cv::Mat points_of(const std::vector<float>& values, int most) {
   cv::Mat out(0, 6, CV_32F);
-  int k = 0;
+  int k = 0, valid = 0;
+  for (std::size_t i = 2; i < values.size(); i += 6) valid += std::isfinite(values[i]);
+  const int every = std::max(1, valid / most);
   for (std::size_t i = 0; i + 5 < values.size(); i += 6) {
     const float* p = values.data() + i;
     if (!std::isfinite(p[2]) || (p[3] == 0 && p[4] == 0 && p[5] == 0) || k++ % every != 0) continue;
@@ -46,8 +51,8 @@ int main(int argc, char** argv) {
   cv::setNumThreads(1);
   const std::vector<float> raw = peer::read_floats(r.cloud, 6 * static_cast<std::size_t>(r.width) * r.height);
   std::vector<cv::Mat> models;
-  for (const std::string& path : r.models) models.push_back(points_of(peer::read_model(path), 1));
-  const cv::Mat scene = points_of(raw, 8);  // it samples anew anyway: on a grid of 0.05 of the scene's extent
+  for (const std::string& path : r.models) models.push_back(points_of(peer::read_model(path), kModelPoints));
+  const cv::Mat scene = points_of(raw, kScenePoints);
   std::vector<peer::PeerPose> out;
   double ms = 0;
   for (std::size_t m = 0; m < models.size(); ++m) {

@@ -34,6 +34,13 @@ class Bop(unittest.TestCase):
         done = run("bop", cls.data, "--no-times", "-o", cls.whole)
         assert done.returncode == 0, done.stderr
 
+    def validate(self, schema, document):
+        path = WORK / (schema + ".json")
+        path.write_text(document)
+        checked = subprocess.run([sys.executable, ROOT / "tools/validate_json", ROOT / f"schema/{schema}.schema.json", path],
+                                 capture_output=True, text=True)
+        self.assertIn(checked.returncode, (0, 77), checked.stdout + checked.stderr)  # 77: no python3-jsonschema
+
     def same_as_whole(self, results):
         for extension in (".csv", ".ndjson"):
             self.assertEqual(results.with_suffix(extension).read_bytes(), self.whole.with_suffix(extension).read_bytes())
@@ -44,11 +51,7 @@ class Bop(unittest.TestCase):
         instances = 0
         for line in self.whole.with_suffix(".ndjson").read_text().splitlines():
             record = json.loads(line)
-            path = WORK / "record.json"
-            path.write_text(line)
-            checked = subprocess.run([sys.executable, ROOT / "tools/validate_json", ROOT / "schema/locate.schema.json", path],
-                                     capture_output=True, text=True)
-            self.assertIn(checked.returncode, (0, 77), checked.stdout + checked.stderr)  # 77: no python3-jsonschema
+            self.validate("locate", line)
             for instance in record["instances"]:
                 scene, image, obj, score, r, t, seconds = rows[instances].split(",")
                 self.assertEqual((int(scene), int(image)), (record["scene_id"], record["im_id"]))
@@ -105,6 +108,7 @@ class Bop(unittest.TestCase):
         for extension in (".csv", ".ndjson"):
             out = run("eval", self.data, self.whole.with_suffix(extension), "--json", "-")
             self.assertEqual(out.returncode, 0, out.stderr)
+            self.validate("eval", out.stdout)
             judged.append(json.loads(out.stdout))
             text = run("eval", self.data, self.whole.with_suffix(extension), "--list")
             self.assertIn("found of >= 40 % visible", text.stdout)
