@@ -3,12 +3,14 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <mutex>
 #include <thread>
 #include <vector>
 
 #include "support/handshake_campaign.hpp"
 #include "tribin/controller_sim/server.hpp"
 #include "tribin/robot/nx100.hpp"
+#include "tribin/robot/watchdog.hpp"
 
 namespace tribin {
 namespace {
@@ -21,6 +23,11 @@ struct QueueTest : testing::Test {
                              {idle_s});
   }
   std::unique_ptr<robot::Clock> clock = robot::make_clock(2);
+  bool machine_is_held() {
+    bool held = false;
+    server.locked([&] { held = machine.status().held_by_command; });
+    return held;
+  }
   // Ready before the server's thread sees it.
   static Machine running_machine() {
     MachineOptions options;
@@ -84,6 +91,42 @@ TEST_F(QueueTest, AsksForTheStatusWhileIdle) {
   int commands = 0;
   server.locked([&] { commands = wire.commands; });
   EXPECT_GE(commands, 3);
+}
+
+TEST_F(QueueTest, TheWatchdogHoldsARobotWhoseClientIsGone) {
+  const auto controller = queue(5);
+  std::atomic<double> client_s{clock->now_s()};
+  std::mutex mutex;
+  std::vector<std::string> told;
+  robot::Watchdog dog(
+      *controller, *clock,
+      [&] {
+        robot::WatchFacts facts;
+        facts.client_s = client_s;
+        facts.scan_s = clock->now_s();
+        return facts;
+      },
+      {.silence_s = 20, .client_s = 3},
+      [&](const std::string& reason, bool held) {
+        const std::lock_guard lock(mutex);
+        told.push_back(reason + (held ? ": held" : ": not held"));
+      });
+  clock->sleep_s(1.5);  // not on watch yet
+  EXPECT_FALSE(machine_is_held());
+  client_s = clock->now_s();
+  dog.watch(true);
+  for (int i = 0; i < 5; ++i) {  // a client that is heard
+    client_s = clock->now_s();
+    clock->sleep_s(0.2);
+  }
+  EXPECT_FALSE(machine_is_held());
+  for (int i = 0; i < 200 && dog.watching(); ++i) clock->sleep_s(0.1);  // and then no more
+  EXPECT_TRUE(machine_is_held());
+  clock->sleep_s(0.3);
+  const std::lock_guard lock(mutex);
+  ASSERT_EQ(told.size(), 1u);
+  EXPECT_NE(told[0].find("the client was not heard"), std::string::npos);
+  EXPECT_TRUE(told[0].ends_with(": held"));
 }
 
 }  // namespace
