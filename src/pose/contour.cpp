@@ -66,12 +66,18 @@ ContourSums contour_sums(const RenderMesh& mesh, const SceneDepth& scene, const 
   Eigen::Matrix<double, 6, 6> h = Eigen::Matrix<double, 6, 6>::Zero();
   Eigen::Matrix<double, 6, 1> b = Eigen::Matrix<double, 6, 1>::Zero();
   const Vec3f eye = Vec3f((-(rotation.transpose() * camera_from_part.translation())).cast<float>());
+  // One byte a triangle, and one that stands for the open side of borders.
   thread_local std::vector<float> side;
-  side.resize(mesh.triangles.size());
-  raster::sides_of_camera(mesh.normals.data()->data(), mesh.offsets.data(), side.size(), eye, side.data());
-  const auto faces_camera = [&](std::int32_t t) { return t >= 0 && side[static_cast<std::size_t>(t)] > 0; };
+  thread_local std::vector<std::uint8_t> front;
+  const std::size_t triangles = mesh.triangles.size();
+  side.resize(triangles);
+  front.assign(triangles + 1, 0);
+  raster::sides_of_camera(mesh.normals.data()->data(), mesh.offsets.data(), triangles, eye, side.data());
+  for (std::size_t k = 0; k < triangles; ++k) front[k] = side[k] > 0;
+  const std::uint8_t* faces_camera = front.data();
   for (const OutlineEdge& edge : mesh.edges) {
-    const bool front0 = faces_camera(edge.triangles[0]), front1 = faces_camera(edge.triangles[1]);
+    const auto at = [&](std::int32_t t) { return t < 0 ? triangles : static_cast<std::size_t>(t); };
+    const std::uint8_t front0 = faces_camera[at(edge.triangles[0])], front1 = faces_camera[at(edge.triangles[1])];
     if (front0 == front1) continue;
     const Eigen::Vector3d p0 = camera_from_part * mesh.vertices[edge.vertices[0]].cast<double>();
     const Eigen::Vector3d p1 = camera_from_part * mesh.vertices[edge.vertices[1]].cast<double>();
@@ -84,6 +90,8 @@ ContourSums contour_sums(const RenderMesh& mesh, const SceneDepth& scene, const 
     Vec2 along = e - a;
     const double length = along.norm();
     if (length < 1e-6) continue;
+    const int count = std::max(1, static_cast<int>(length / render.step));
+    const double weight = kSampleWeight * length / count;
     along /= length;
     Vec2 m(along[1], -along[0]);
     // Outward: away from the seen facet's third vertex.
@@ -92,9 +100,6 @@ ContourSums contour_sums(const RenderMesh& mesh, const SceneDepth& scene, const 
       const Vec2 third = camera.project(Vec3(camera_from_part * mesh.vertices[k].cast<double>()));
       if (m.dot(third - a) > 0) m = -m;
     }
-    // Samples a rendered pixel apart, at least one an edge; short edges count by their length.
-    const int count = std::max(1, static_cast<int>(length / render.step));
-    const double weight = kSampleWeight * length / count;
     for (int k = 0; k < count; ++k) {
       const double f = (k + 0.5) / count;
       // Perspective: equal steps on the screen.

@@ -89,21 +89,19 @@ void look(const SceneDepth& scene, const FastPose& pose, const Vec3f& point, con
 }  // namespace
 
 LookUp look_up(const SceneDepth& scene, const Pose& camera_from_part, std::span<const Vec3f> points,
-               std::span<const Vec3f> normals, std::size_t count, double tolerance_mm) {
-  return look_up_early(scene, camera_from_part, points, normals, count, count, tolerance_mm, -1e9);
-}
-
-LookUp look_up_early(const SceneDepth& scene, const Pose& camera_from_part, std::span<const Vec3f> points,
-                     std::span<const Vec3f> normals, std::size_t first, std::size_t count, double tolerance_mm,
-                     double hopeless) {
+               std::span<const Vec3f> normals, std::size_t count, double tolerance_mm,
+               std::span<const GiveUp> give_up) {
   LookUp out;
   const FastPose pose(camera_from_part);
-  const auto tolerance = static_cast<float>(tolerance_mm);
   count = std::min(count, points.size());
-  first = std::min(first, count);
-  for (std::size_t i = 0; i < first; ++i) look(scene, pose, points[i], normals[i], tolerance, out);
-  if (first < count && out.score() < hopeless) return out;
-  for (std::size_t i = first; i < count; ++i) look(scene, pose, points[i], normals[i], tolerance, out);
+  auto stop = give_up.begin();
+  for (std::size_t i = 0; i < count; ++i) {
+    if (stop != give_up.end() && i == stop->after) {
+      if (out.score() < stop->below) return out;
+      ++stop;
+    }
+    look(scene, pose, points[i], normals[i], static_cast<float>(tolerance_mm), out);
+  }
   return out;
 }
 

@@ -59,7 +59,7 @@ Sums accumulate(const SceneDepth& scene, const IndexRender& render, const Eigen:
                 double cad_sigma_mm, double kernel_sigmas, bool final_pass) {
   std::vector<Sums> bands(static_cast<std::size_t>((render.height + kBandRows - 1) / kBandRows));
   const PinholeCamera& camera = scene.camera;
-  parallel_ranges(render.height, kBandRows, [&](int begin, int end) {
+  const auto band = [&](int begin, int end) {
     Sums& s = bands[static_cast<std::size_t>(begin / kBandRows)];
     for (int j = begin; j < end; ++j) {
       const int v = render.v0 + j * render.step;
@@ -98,7 +98,14 @@ Sums accumulate(const SceneDepth& scene, const IndexRender& render, const Eigen:
         s.pixels += robust > 0.25;
       }
     }
-  });
+  };
+  // Small renders are not worth sharing: most of them are one of many that run side by side.
+  constexpr int kWorthSharing = 40000;
+  if (render.width * render.height < kWorthSharing)
+    for (int begin = 0; begin < render.height; begin += kBandRows)
+      band(begin, std::min(render.height, begin + kBandRows));
+  else
+    parallel_ranges(render.height, kBandRows, band);
   Sums total;
   for (const Sums& s : bands) total.add(s);
   return total;

@@ -25,17 +25,20 @@ struct LookUp {
   }
 };
 
+/// A look-up is given up after so many points when their score is below this.
+struct GiveUp {
+  std::size_t after = 0;
+  double below = 0;
+};
+
 /// Looks the first `count` points up in the depth image.
 /// \param points, normals  part frame, visible from the camera at this pose (a PartView).
 /// \param tolerance_mm     distance along the normal up to which a point is supported.
+/// \param give_up          in the order of `after`.
 /// \cost                   about 10 ns a point.
 LookUp look_up(const SceneDepth& scene, const Pose& camera_from_part, std::span<const Vec3f> points,
-               std::span<const Vec3f> normals, std::size_t count, double tolerance_mm);
-
-/// The same, given up after `first` points when their score is below `hopeless`.
-LookUp look_up_early(const SceneDepth& scene, const Pose& camera_from_part, std::span<const Vec3f> points,
-                     std::span<const Vec3f> normals, std::size_t first, std::size_t count, double tolerance_mm,
-                     double hopeless);
+               std::span<const Vec3f> normals, std::size_t count, double tolerance_mm,
+               std::span<const GiveUp> give_up = {});
 
 struct PointRefineOptions {
   int iterations = 8;
