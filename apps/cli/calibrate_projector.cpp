@@ -6,6 +6,7 @@
 #include "tribin/core/error.hpp"
 #include "tribin/core/log.hpp"
 #include "tribin/io/frames_file.hpp"
+#include "tribin/io/rig_file.hpp"
 #ifdef TRIBIN_WITH_CALIBRATION
 #include "tribin/calibration/find_board.hpp"
 #endif
@@ -17,7 +18,7 @@ namespace fs = std::filesystem;
 
 struct Options : CalibrationArguments {
   std::vector<std::string> stops;
-  std::string list, projector_size;
+  std::string list, projector_size, rig;
 };
 
 /// A folder of frames, or all folders of frames in it, by name.
@@ -114,11 +115,34 @@ RigCalibrationReport look(const Options& options) {
   return out;
 }
 
+/// The cameras of a rig that is calibrated already are held.
+void hold_cameras(const std::string& file, RigCalibrationReport& report) {
+  report.known = read_rig(file);
+  for (BoardObserver& observer : report.observers) {
+    if (observer.projector) continue;
+    std::string names;
+    for (const RigCamera& camera : report.known->cameras) {
+      names += (names.empty() ? "" : ", ") + camera.name;
+      if (camera.name == observer.name) observer.known = camera;
+    }
+    if (!observer.known)
+      throw Error(ErrorCode::bad_input,
+                  file + ": saw no camera " + observer.name + " (it has " + names + "), wanted those of the frames");
+    const PinholeCamera& camera = observer.known->camera;
+    if (camera.width != observer.width || camera.height != observer.height)
+      throw Error(ErrorCode::bad_input, file + ": saw camera " + observer.name + " of " + std::to_string(camera.width) +
+                                            " x " + std::to_string(camera.height) + " px, wanted " +
+                                            std::to_string(observer.width) + " x " + std::to_string(observer.height) +
+                                            " as its frames have");
+  }
+}
+
 #endif
 
 int run([[maybe_unused]] const Options& options, [[maybe_unused]] const Context& context) {
 #ifdef TRIBIN_WITH_CALIBRATION
   RigCalibrationReport report = look(options);
+  if (!options.rig.empty()) hold_cameras(options.rig, report);
   report.result = calibrate_rig(report.board, report.observers);
   return finish_calibration(options, report, context);
 #else
@@ -130,12 +154,16 @@ int run([[maybe_unused]] const Options& options, [[maybe_unused]] const Context&
 
 void add_calibrate_projector(CLI::App& group, Context& context) {
   auto options = std::make_shared<Options>();
-  CLI::App* command = add_command(group, context, "projector",
-                                  "Projector and cameras at once, from the frames of a pattern set on a board",
-                                  "tribin calibrate projector stops --size 9x6 --pitch-mm 20 -o rig.json");
+  CLI::App* command = add_command(
+      group, context, "projector", "Projector and cameras at once, from the frames of a pattern set on a board",
+      "tribin calibrate projector stops --size 9x6 --pitch-mm 20 -o rig.json\n"
+      "  tribin calibrate projector stops --size 9x6 --pitch-mm 20 --rig cameras.json -o rig.json");
   command->add_option("STOPS", options->stops, "Folders of frames of the board, or one folder that holds them")
       ->required();
   command->add_option("--frames", options->list, "frames.json of folders that have none")->type_name("FILE");
+  command
+      ->add_option("--rig", options->rig, "Cameras that are calibrated already: they are held, the projector is added")
+      ->type_name("FILE");
   command->add_option("--projector-size", options->projector_size, "Where frames.json does not say it [px]")
       ->type_name("WxH");
   add_calibration_arguments(command, *options);

@@ -84,8 +84,13 @@ std::optional<BoardSighting> find_chessboard(const Image<std::uint8_t>& picture,
   return out;
 }
 
-/// The centroid of a blob's grey levels against its surroundings; its half axis is about a quarter of `pitch_px`.
-Vec2 centroid(const Image<std::uint8_t>& picture, const Vec2& start, double pitch_px, bool light) {
+struct Blob {
+  Vec2 centre;
+  double area = 0;  ///< [px]
+};
+
+/// Centroid and area of a blob's grey levels against its surroundings; its half axis is about a quarter of `pitch_px`.
+Blob blob_at(const Image<std::uint8_t>& picture, const Vec2& start, double pitch_px, bool light) {
   const double reach = 0.5 * pitch_px;
   // Between the two grey levels of the window: a tenth of the way off both, noise and shading count for nothing.
   std::vector<std::uint8_t> values;
@@ -95,11 +100,11 @@ Vec2 centroid(const Image<std::uint8_t>& picture, const Vec2& start, double pitc
         if (picture.contains(u, v) && (Vec2(u, v) - start).squaredNorm() <= reach * reach) visit(u, v);
   };
   each([&](int u, int v) { values.push_back(picture(u, v)); });
-  if (values.size() < 9) return start;
+  if (values.size() < 9) return {start};
   std::sort(values.begin(), values.end());
   const double low = values[values.size() / 20], high = values[values.size() - 1 - values.size() / 20];
   const double floor = low + 0.1 * (high - low), roof = high - 0.1 * (high - low);
-  if (!(roof > floor)) return start;
+  if (!(roof > floor)) return {start};
   Vec2 sum = Vec2::Zero();
   double weight = 0;
   each([&](int u, int v) {
@@ -108,7 +113,7 @@ Vec2 centroid(const Image<std::uint8_t>& picture, const Vec2& start, double pitc
     sum += w * Vec2(u, v);
     weight += w;
   });
-  return weight > 0 ? Vec2(sum / weight) : start;
+  return weight > 0 ? Blob{sum / weight, weight} : Blob{start};
 }
 
 std::optional<BoardSighting> find_circles(const Image<std::uint8_t>& picture, const Board& board) {
@@ -132,7 +137,9 @@ std::optional<BoardSighting> find_circles(const Image<std::uint8_t>& picture, co
       double nearest = 1e9;
       for (std::size_t j = 0; j < rough.size(); ++j)
         if (j != i) nearest = std::min(nearest, (rough[j] - rough[i]).norm());
-      out.pixel[i] = centroid(picture, rough[i], nearest, light);
+      const Blob blob = blob_at(picture, rough[i], nearest, light);
+      out.pixel[i] = blob.centre;
+      out.area_px.push_back(blob.area);
     }
     return out;
   }

@@ -4,6 +4,7 @@
 #include <Eigen/LU>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "tribin/core/error.hpp"
 
@@ -121,6 +122,15 @@ struct Normal {
   std::vector<Eigen::MatrixXd> cross;  // shared x 6
 };
 
+/// Stretches of the shared parameters that do not move: the first device's pose holds the rig's frame, and all of what
+/// is fixed.
+std::vector<std::pair<int, int>> held_parameters(const Bundle& bundle) {
+  std::vector<std::pair<int, int>> out{{9, 6}};
+  for (std::size_t d = 0; d < bundle.devices.size(); ++d)
+    if (bundle.devices[d].fixed) out.emplace_back(kOfDevice * static_cast<int>(d), kOfDevice);
+  return out;
+}
+
 Normal normal_equations(const Bundle& bundle, Loss loss) {
   const int shared = kOfDevice * static_cast<int>(bundle.devices.size());
   const std::size_t views = bundle.rig_from_board.size();
@@ -152,12 +162,13 @@ Normal normal_equations(const Bundle& bundle, Loss loss) {
       n.shared_right[at + i] += weight * (device.intrinsics[i] - device.prior_mean[i]);
     }
   }
-  // The first device holds the rig's frame.
-  n.shared.middleRows<6>(9).setZero();
-  n.shared.middleCols<6>(9).setZero();
-  n.shared.block<6, 6>(9, 9).setIdentity();
-  n.shared_right.segment<6>(9).setZero();
-  for (Eigen::MatrixXd& c : n.cross) c.middleRows<6>(9).setZero();
+  for (const auto& [begin, count] : held_parameters(bundle)) {
+    n.shared.middleRows(begin, count).setZero();
+    n.shared.middleCols(begin, count).setZero();
+    n.shared.block(begin, begin, count, count).setIdentity();
+    n.shared_right.segment(begin, count).setZero();
+    for (Eigen::MatrixXd& c : n.cross) c.middleRows(begin, count).setZero();
+  }
   return n;
 }
 
@@ -278,8 +289,10 @@ Eigen::MatrixXd covariance(const Bundle& bundle) {
   Eigen::MatrixXd out = scale.asDiagonal() *
                         scaled.ldlt().solve(Eigen::MatrixXd::Identity(scaled.rows(), scaled.cols())) *
                         scale.asDiagonal();
-  out.middleRows<6>(9).setZero();
-  out.middleCols<6>(9).setZero();
+  for (const auto& [begin, count] : held_parameters(bundle)) {
+    out.middleRows(begin, count).setZero();
+    out.middleCols(begin, count).setZero();
+  }
   return 0.5 * (out + out.transpose());
 }
 

@@ -16,6 +16,7 @@ struct Device {
   Intrinsics intrinsics = Intrinsics::Zero();
   Intrinsics prior_mean = Intrinsics::Zero(), prior_sd = Intrinsics::Zero();
   Pose rig_from_device = Pose::Identity();  ///< the first device's is held
+  bool fixed = false;                       ///< neither lens nor pose moves
   double sigma = 1;                         ///< of one coordinate of a point [px]
 };
 

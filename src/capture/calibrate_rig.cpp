@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "capture/calibration_steps.hpp"
+#include "capture/circle_bias.hpp"
 #include "tribin/core/error.hpp"
 
 namespace tribin {
@@ -22,7 +23,7 @@ void set_final_sigmas(Bundle& bundle) {
   };
   for (const Sight& s : bundle.sights)
     if (bundle.view_used[static_cast<std::size_t>(s.view)]) in_view[static_cast<std::size_t>(s.view)] += used_points(s);
-  for (std::size_t d = 0; d < taken.size(); ++d) taken[d] = d == 0 ? 9 : 15;
+  for (std::size_t d = 0; d < taken.size(); ++d) taken[d] = bundle.devices[d].fixed ? 0 : d == 0 ? 9 : 15;
   for (const Sight& s : bundle.sights) {
     const auto d = static_cast<std::size_t>(s.device), v = static_cast<std::size_t>(s.view);
     if (!bundle.view_used[v] || in_view[v] == 0) continue;
@@ -46,13 +47,8 @@ RigCamera camera_of(const Device& device, const BoardObserver& observer) {
   return out;
 }
 
-}  // namespace
-
-RigCalibration calibrate_rig(const Board& board, std::span<const BoardObserver> observers) {
-  validate(board);
-  TRIBIN_ASSERT(!observers.empty());
-  const std::size_t views = observers[0].views.size();
-  for (const BoardObserver& o : observers) TRIBIN_ASSERT(o.views.size() == views && o.width > 0 && o.height > 0);
+/// All observers, from nothing.
+Bundle solve(const Board& board, std::span<const BoardObserver> observers) {
   std::vector<Bundle> alone;
   for (const BoardObserver& o : observers) alone.push_back(calibrate_alone(board, o));
   Bundle bundle = observers.size() == 1 ? alone[0] : join(board, observers, alone);
@@ -61,6 +57,26 @@ RigCalibration calibrate_rig(const Board& board, std::span<const BoardObserver> 
     set_final_sigmas(bundle);
     refine(bundle, Loss::squares);
   }
+  return bundle;
+}
+
+}  // namespace
+
+RigCalibration calibrate_rig(const Board& board, std::span<const BoardObserver> observers) {
+  validate(board);
+  TRIBIN_ASSERT(!observers.empty());
+  const std::size_t views = observers[0].views.size();
+  bool any_known = false;
+  for (const BoardObserver& o : observers) {
+    TRIBIN_ASSERT(o.views.size() == views && o.width > 0 && o.height > 0);
+    any_known = any_known || o.known;
+  }
+  TRIBIN_ASSERT(!any_known || observers[0].known);  // it holds the rig's frame
+  Bundle bundle = solve(board, observers);
+  std::vector<BoardObserver> centred(observers.begin(), observers.end());
+  // A second round moves what is left of the first one: the bias changes with the pose by a hundredth of itself.
+  for (int round = 0; round < 2 && centre_circles(board, bundle, observers, centred); ++round)
+    bundle = solve(board, centred);
   const Eigen::MatrixXd all = covariance(bundle);
 
   RigCalibration out;

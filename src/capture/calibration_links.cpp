@@ -96,6 +96,10 @@ Bundle join(const Board& board, std::span<const BoardObserver> observers, const 
   std::vector<char> linked(observers.size(), 0);
   std::vector<std::vector<int>> turns(observers.size(), std::vector<int>(views, 0));
   linked[0] = 1;
+  const auto place_if_known = [&](std::size_t d) {
+    if (observers[d].known) out.devices[d].rig_from_device = observers[d].known->rig_from_camera;
+  };
+  place_if_known(0);
   for (std::size_t done = 1; done < observers.size(); ++done) {
     // The strongest link next: most shared views.
     int most = 0;
@@ -120,6 +124,7 @@ Bundle join(const Board& board, std::span<const BoardObserver> observers, const 
       reference.rig_from_board[v] = reference.rig_from_board[v] * turn_of_board(board, turns[from][v]);
     const Link l = link(board, reference, alone[to]);
     out.devices[to].rig_from_device = out.devices[from].rig_from_device * l.first_from_second;
+    place_if_known(to);
     turns[to] = l.turn;
     linked[to] = 1;
   }

@@ -90,6 +90,7 @@ double robust_sigma(const Bundle& bundle, int device) {
 }
 
 void set_priors(Device& device, const BoardObserver& observer) {
+  if (device.fixed) return;
   const double diagonal = std::hypot(observer.width, observer.height);
   const double corner = 0.5 * diagonal / device.intrinsics[0], square = corner * corner;
   device.prior_mean << 0, 0, 0.5 * (observer.width - 1), 0.5 * (observer.height - 1), 0, 0, 0, 0, 0;
@@ -97,6 +98,25 @@ void set_priors(Device& device, const BoardObserver& observer) {
   device.prior_sd << 0, 0, principal, principal, 0.3 / square, 0.1 / (square * square), 0.01 / corner, 0.01 / corner,
       0.01 / (square * square * square);
 }
+
+namespace {
+
+/// The boards before a device that is known.
+Bundle place_boards(Bundle bundle, const std::vector<Eigen::Matrix3d>& homographies, const BoardObserver& observer) {
+  const PinholeCamera& c = observer.known->camera;
+  const Distortion& d = observer.known->distortion;
+  Device& device = bundle.devices[0];
+  device.fixed = true;
+  device.intrinsics << c.fx, c.fy, c.cx, c.cy, d[0], d[1], d[2], d[3], d[4];
+  for (std::size_t i = 0; i < bundle.sights.size(); ++i)
+    bundle.rig_from_board[static_cast<std::size_t>(bundle.sights[i].view)] =
+        pose_of_homography(homographies[i], c.fx, {c.cx, c.cy});
+  refine(bundle, Loss::huber, 20);
+  settle(bundle, {&observer, 1});
+  return bundle;
+}
+
+}  // namespace
 
 Bundle calibrate_alone(const Board& board, const BoardObserver& observer) {
   const std::size_t views = observer.views.size();
@@ -117,6 +137,7 @@ Bundle calibrate_alone(const Board& board, const BoardObserver& observer) {
     start.view_used[v] = 1;
   }
   need_views(start, {&observer, 1});
+  if (observer.known) return place_boards(std::move(start), homographies, observer);
   // A camera's principal point is near the middle; a projector throws upwards or downwards.
   std::vector<Vec2> principals{Vec2(0.5 * (observer.width - 1), 0.5 * (observer.height - 1))};
   if (observer.projector)

@@ -112,12 +112,12 @@ Json json_of(const BoardObserver& seen, const ObserverCalibration& o, bool first
 }  // namespace
 
 Rig rig_of(const RigCalibrationReport& report) {
-  Rig rig;
+  Rig rig = report.known.value_or(Rig{});
   for (std::size_t i = 0; i < report.observers.size(); ++i) {
     const RigCamera& camera = report.result.observers[i].camera;
     if (report.observers[i].projector)
       rig.projector = camera;
-    else
+    else if (!report.known)
       rig.cameras.push_back(camera);
   }
   return rig;
@@ -142,6 +142,15 @@ std::vector<Warning> rig_calibration_warnings(const RigCalibrationReport& report
   for (std::size_t i = 0; i < report.observers.size(); ++i) {
     int views = 0;
     for (const BoardView& v : report.result.views) views += v.used && std::isfinite(v.rms_px[i]);
+    if (report.observers[i].known) {
+      // A calibration that fits leaves what the detector leaves: some tenths of a pixel.
+      constexpr double kFits = 1;
+      if (report.result.observers[i].rms_px > kFits)
+        out.push_back({"known_camera_off", "The boards are " + with("%.2f px", report.result.observers[i].rms_px) +
+                                               " off where the rig says that " + name_of(report.observers[i]) +
+                                               " sees them: it was moved since; calibrate it anew."});
+      continue;
+    }
     warn_of_observer(report.observers[i], report.result.observers[i], views, out);
   }
   return out;

@@ -62,6 +62,82 @@ TEST(CalibrateRig, FindsAnyRigWithinItsCovariance) {
   EXPECT_NEAR(all.squares / all.count, 0.95, 0.15) << all.count;
 }
 
+TEST(CalibrateRig, AddsAProjectorToCamerasThatAreKnown) {
+  Deviations all;
+  for (unsigned seed = 1; seed <= 15; ++seed) {
+    SCOPED_TRACE(seed);
+    BoardRig rig =
+        test::random_board_rig(seed, {.cameras = 1 + static_cast<int>(seed % 2), .projector = true, .views = 8});
+    // The rig's frame lies elsewhere than in its first camera.
+    const Pose rig_from_first = test::pose_at(Vec3(0.1, 0.2, -0.3), Vec3(100, -50, 20));
+    for (RigCamera& device : rig.devices) device.rig_from_camera = rig_from_first * device.rig_from_camera;
+    for (Pose& pose : rig.rig_from_board) pose = rig_from_first * pose;
+    std::vector<BoardObserver> seen = test::observed(rig, 0.1, seed);
+    for (std::size_t d = 0; d + 1 < seen.size(); ++d) seen[d].known = rig.devices[d];
+    const RigCalibration result = calibrate_rig(rig.board, seen);
+    for (std::size_t d = 0; d + 1 < seen.size(); ++d) {
+      EXPECT_EQ(test::intrinsics_of(result.observers[d].camera), test::intrinsics_of(rig.devices[d]));
+      EXPECT_EQ(result.observers[d].camera.rig_from_camera.matrix(), rig.devices[d].rig_from_camera.matrix());
+      EXPECT_EQ(result.observers[d].covariance(0, 0), 0);
+      EXPECT_NEAR(result.observers[d].sigma_px, 0.1, 0.02);
+    }
+    const ObserverCalibration& got = result.observers.back();
+    const auto want = test::intrinsics_of(rig.devices.back()), numbers = test::intrinsics_of(got.camera);
+    Deviations own;
+    for (int i = 0; i < 9; ++i)
+      own.add(numbers[static_cast<std::size_t>(i)] - want[static_cast<std::size_t>(i)],
+              std::sqrt(got.covariance(i, i)));
+    const Pose& pose = rig.devices.back().rig_from_camera;
+    const Vec3 t = pose.translation() - got.camera.rig_from_camera.translation();
+    for (int i = 0; i < 3; ++i) own.add(t[i], std::sqrt(got.pose_covariance(i, i)));
+    EXPECT_LT(own.worst, 4.5);
+    all.squares += own.squares, all.count += own.count;
+  }
+  EXPECT_NEAR(all.squares / all.count, 0.95, 0.35) << all.count;
+}
+
+TEST(CalibrateRig, CirclesSeenAslantAreMeasuredAtTheirCentres) {
+  for (unsigned seed = 1; seed <= 6; ++seed) {
+    SCOPED_TRACE(seed);
+    const Board board{BoardKind::asymmetric_circles, 4, 11, 40};
+    const BoardRig rig = test::random_board_rig(seed, {.board = board, .cameras = 1, .views = 12, .focal = 1.0});
+    std::vector<BoardObserver> exact = test::observed(rig, 0, seed), blobs = exact;
+    const std::vector<Vec3> points = board_points(board);
+    const double radius = 0.25 * board.pitch_mm;  // half of the diagonal neighbours' distance is white
+    double most = 0;
+    for (std::size_t v = 0; v < rig.rig_from_board.size(); ++v) {
+      BoardSighting& seen = blobs[0].views[v];
+      for (std::size_t i = 0; i < seen.point.size(); ++i) {
+        // The blob's area and centroid from its outline: Green's theorem on 720 points.
+        double area = 0;
+        Vec2 moment = Vec2::Zero(), before = Vec2::Zero();
+        const Vec3 centre = points[static_cast<std::size_t>(seen.point[i])];
+        for (int k = 0; k <= 720; ++k) {
+          const double a = k * kPi / 360;
+          const Vec2 now =
+              pixel_of(rig.devices[0], rig.rig_from_board[v] * (centre + radius * Vec3(std::cos(a), std::sin(a), 0))) -
+              seen.pixel[i];
+          const double cross = before.x() * now.y() - before.y() * now.x();
+          if (k > 0) area += cross / 2, moment += cross / 6 * (before + now);
+          before = now;
+        }
+        most = std::max(most, (moment / area).norm());
+        seen.pixel[i] += moment / area;
+        seen.area_px.push_back(std::abs(area));
+      }
+    }
+    const RigCalibration corrected = calibrate_rig(board, blobs);
+    for (BoardSighting& seen : blobs[0].views) seen.area_px.clear();
+    const RigCalibration biased = calibrate_rig(board, blobs);
+    const double focal = rig.devices[0].camera.fx;
+    EXPECT_GT(most, 0.05);
+    EXPECT_LT(corrected.rms_px, 0.05 * biased.rms_px);
+    EXPECT_LT(std::abs(corrected.observers[0].camera.camera.fx - focal), 1e-4 * focal);
+    EXPECT_LT(std::abs(corrected.observers[0].camera.camera.fx - focal),
+              0.2 * std::abs(biased.observers[0].camera.camera.fx - focal) + 0.01);
+  }
+}
+
 TEST(CalibrateRig, LeavesOutAndNamesWrongViews) {
   for (unsigned seed = 1; seed <= 20; ++seed) {
     SCOPED_TRACE(seed);

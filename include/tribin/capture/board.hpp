@@ -42,7 +42,8 @@ int turned_point(const Board& board, int point, int quarter_turns);
 /// What one picture shows of a board.
 struct BoardSighting {
   std::vector<int> point;   ///< rising numbers of board_points
-  std::vector<Vec2> pixel;  ///< where they are; pixel centres at integers
+  std::vector<Vec2> pixel;  ///< where they are; pixel centres at integers. Circles: the centroid of their picture
+  std::vector<double> area_px = {};  ///< circles: how much of the picture each covers; empty = not known
 };
 
 }  // namespace tribin

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -18,9 +19,10 @@ using IntrinsicsCovariance = Eigen::Matrix<double, 9, 9, Eigen::DontAlign>;
 /// A camera, or a projector (which "sees" points of the board where its light meets them), and what it saw.
 struct BoardObserver {
   std::string name;
-  int width = 0, height = 0;         ///< [px]
-  bool projector = false;            ///< its principal point may lie anywhere
-  std::vector<BoardSighting> views;  ///< one a view, in the same order for all observers; empty = board not seen
+  int width = 0, height = 0;            ///< [px]
+  bool projector = false;               ///< its principal point may lie anywhere
+  std::vector<BoardSighting> views;     ///< one a view, in the same order for all observers; empty = board not seen
+  std::optional<RigCamera> known = {};  ///< calibrated already: its lens and place are held, in this rig's frame
 };
 
 /// Which places and tilts the board was seen at, by the views in use.
@@ -40,7 +42,7 @@ struct PointResidual {
 };
 
 struct ObserverCalibration {
-  RigCamera camera;  ///< rig_from_camera is the identity for the first one
+  RigCamera camera;  ///< rig_from_camera is the identity for the first one, or as it is known
   IntrinsicsCovariance covariance = IntrinsicsCovariance::Zero();  ///< in the order of kIntrinsicNames
   Matrix6 pose_covariance = Matrix6::Zero();  ///< of rig_from_camera: (dt mm, w rad), R_true = Exp(w) R
   std::array<bool, 9> held{};                 ///< false: the pictures say less than the prior (see calibrate_rig)
@@ -75,15 +77,19 @@ inline constexpr double kOutlierView = 3;
 
 /// Calibrates all observers together: intrinsics, distortion, places to each other, and the board's pose in each view,
 /// by least squares of the reprojection in pixels, each observer weighed by its own noise. The first observer's frame
-/// is the rig's.
+/// is the rig's, where it is not known.
 ///
 /// Outliers: the start is taken from the views whose relative poses agree most; then views beyond kOutlierView are left
 /// out and may come back, until nothing changes. Boards that look alike after a turn are turned to agree.
 /// Priors keep what the pictures do not hold from being slid by noise: principal point at the picture's middle (sd a
 /// tenth of the diagonal; projectors: the height), and the displacement by k1, k2, p1, p2, k3 at the picture's corner
 /// (sd 30, 10, 1, 1, 1 % of the corner's distance from the middle).
-/// \param observers  one or more, all with the same number of views.
-/// \throws Error    too_little_data for fewer views than kFewestViews, observers that share no view, or boards that
+/// Observers that are known already are held, with covariance 0, so that a projector can be added to a calibrated rig;
+/// the first observer must be among them then.
+/// Circles whose area is known: the centroid of a circle seen aslant is not its centre's picture; the difference, by
+/// the circle's radius and the pose that comes out, is taken off, twice. \param observers  one or more, all with the
+/// same number of views. \throws Error    too_little_data for fewer views than kFewestViews, observers that share no
+/// view, or boards that
 ///                   all face a camera so that its focal length stays open; bad_option for a board that cannot be.
 /// \cost            a tenth of a second for 2 cameras and 15 views.
 /// \source          closed form: Zhang 2000; bundle adjustment with Schur complement: Triggs et al. 2000.

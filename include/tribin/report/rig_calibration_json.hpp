@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,9 +17,10 @@ struct RigCalibrationReport {
   std::vector<BoardObserver> observers;
   std::vector<std::string> not_found;  ///< pictures without the board
   RigCalibration result;
+  std::optional<Rig> known = {};  ///< the rig to which a projector was added: its cameras are kept as they are
 };
 
-/// The rig as it is kept: the observers as cameras, the one that is a projector apart.
+/// The rig as it is kept: the observers as cameras (those of a known rig stay), the one that is a projector apart.
 Rig rig_of(const RigCalibrationReport& report);
 
 /// What to mend, in words: outlying views, pictures without the board, parts of the pictures and tilts that are
