@@ -216,6 +216,21 @@ class CalibrateBoards(unittest.TestCase):
                                   "-o", WORK / "board.ply"], capture_output=True, text=True)
         self.assertEqual((scanned.returncode, scanned.stderr), (0, ""))
         self.assertEqual(run("projector", WORK / "stops", "--projector-size", "x", out="p.json").returncode, 2)
+        # Onto cameras that are calibrated already: they are kept as they are, those without frames too.
+        cameras = json.loads((WORK / "projector.json").read_text())
+        cameras["projector"] = None
+        cameras["cameras"].append(dict(cameras["cameras"][0], name="other"))
+        (WORK / "cameras.json").write_text(json.dumps(cameras))
+        out = run("projector", WORK / "stops", "--rig", WORK / "cameras.json", out="both.json")
+        self.assertEqual(out.returncode, 0, out.stderr)
+        self.assertNotIn("left", out.stderr)  # what is known is not told to be looked at again
+        both = json.loads((WORK / "both.json").read_text())
+        self.assertEqual(both["cameras"], cameras["cameras"])
+        before = json.loads((WORK / "projector.json").read_text())["projector"]
+        self.assertLess(abs(both["projector"]["K"][0] - before["K"][0]), 5 * projector["sd"]["fx"])
+        cameras["cameras"] = cameras["cameras"][1:]
+        (WORK / "cameras.json").write_text(json.dumps(cameras))
+        self.fails(run("projector", WORK / "stops", "--rig", WORK / "cameras.json", out="both.json"), 3, "no camera left")
 
     def test_projector_wants_frames(self):
         self.fails(run("projector", WORK / "left"), 3, "frames.json")
