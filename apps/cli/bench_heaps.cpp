@@ -38,30 +38,14 @@ struct Stock {
   std::vector<fs::path> points;  ///< float32 x y z nx ny nz
 };
 
-/// Points on the surface with the normals of their facets.
-std::vector<float> oriented_points(const Mesh& mesh, int count) {
-  const double area_each = [&] {
-    double area = 0;
-    for (const auto& t : mesh.triangles)
-      area += 0.5 * (mesh.vertices[t[1]] - mesh.vertices[t[0]]).cross(mesh.vertices[t[2]] - mesh.vertices[t[0]]).norm();
-    return area / count;
-  }();
+/// Points on the surface with the normals of their facets, as peers read them.
+std::vector<float> oriented_points(const Mesh& mesh) {
+  constexpr int kPoints = 20000;  // 1 % of the diameter apart
+  std::vector<Vec3f> normals;
+  const std::vector<Vec3f> points = eval::points_on(mesh, kPoints, &normals);
   std::vector<float> out;
-  double owed = 0;
-  unsigned i = 0;
-  for (const auto& t : mesh.triangles) {
-    const Vec3f a = mesh.vertices[t[0]], u = mesh.vertices[t[1]] - a, v = mesh.vertices[t[2]] - a;
-    const Vec3f n = u.cross(v);
-    if (!(n.norm() > 0)) continue;
-    for (owed += 0.5 * n.norm() / area_each; owed >= 1; owed -= 1, ++i) {
-      // Steps of the plastic number fill the unit square evenly.
-      float x = static_cast<float>(std::fmod(0.7548776662 * i, 1)),
-            y = static_cast<float>(std::fmod(0.5698402910 * i, 1));
-      if (x + y > 1) x = 1 - x, y = 1 - y;
-      const Vec3f p = a + x * u + y * v, m = n.normalized();
-      out.insert(out.end(), {p[0], p[1], p[2], m[0], m[1], m[2]});
-    }
-  }
+  for (std::size_t i = 0; i < points.size(); ++i)
+    for (const Vec3f& v : {points[i], normals[i]}) out.insert(out.end(), {v[0], v[1], v[2]});
   return out;
 }
 
@@ -73,7 +57,7 @@ Stock stock_of(const fs::path& dataset, const fs::path& scratch) {
     options.cache = part_cache_folder();
     stock.parts.push_back(read_part(object.file, options));
     stock.points.push_back(scratch / ("model_" + std::to_string(object.id)));
-    peer::write_raw(stock.points.back().string(), oriented_points(stock.parts.back().mesh, 20000));
+    peer::write_raw(stock.points.back().string(), oriented_points(stock.parts.back().mesh));
   }
   return stock;
 }

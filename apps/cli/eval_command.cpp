@@ -10,7 +10,7 @@ namespace {
 
 struct Options {
   std::string dataset, results, split = "test", targets, models = "models", json;
-  bool list = false, done = false;
+  bool list = false, done = false, in_view = false;
 };
 
 int run(const Options& options) {
@@ -23,7 +23,8 @@ int run(const Options& options) {
       return std::none_of(results.begin(), results.end(),
                           [&](const eval::ImageResult& r) { return r.scene == image.scene && r.image == image.image; });
     });
-  const eval::Judged judged = eval::judge_results(truths, results, models);
+  eval::Judged judged = eval::judge_results(truths, results, models);
+  if (options.in_view) eval::mark_in_view(judged, truths, models, options.dataset, options.split, models_dir);
   if (!options.json.empty()) write_text(options.json, eval_json(judged));
   if (options.json != "-") std::cout << eval_text(judged, options.list);
   return 0;
@@ -44,6 +45,8 @@ void add_eval(CLI::App& app, Context& context) {
   command->add_option("--models", options->models, "Folder of its models")->type_name("NAME");
   command->add_option("--json", options->json, "Write the figures as JSON; - is stdout")->type_name("OUT|-");
   command->add_flag("--list", options->list, "Name each missed part and each false answer");
+  command->add_flag("--in-view", options->in_view,
+                    "Tell parts apart whose telling feature the scan shows: all others cannot be known");
   command->add_flag("--done", options->done, "Leave out images without a result instead of counting them as missed");
   command->callback([options, &context] { context.run = [options] { return run(*options); }; });
 }

@@ -126,7 +126,7 @@ double overlap(const Model& model, const Pose& a, const Pose& b, double limit_mm
   return asked > 0 ? static_cast<double>(near) / static_cast<double>(asked) : 0;
 }
 
-std::vector<Vec3f> points_on(const Mesh& mesh, int count) {
+std::vector<Vec3f> points_on(const Mesh& mesh, int count, std::vector<Vec3f>* normals) {
   std::vector<double> area_before;
   double area = 0;
   for (const auto& t : mesh.triangles) {
@@ -147,8 +147,9 @@ std::vector<Vec3f> points_on(const Mesh& mesh, int count) {
     const auto& t = mesh.triangles[static_cast<std::size_t>(after - area_before.begin()) - 1];
     const float root = static_cast<float>(std::sqrt(radical_inverse(3, i))),
                 v = static_cast<float>(radical_inverse(5, i));
-    out.push_back((1 - root) * mesh.vertices[t[0]] + root * (1 - v) * mesh.vertices[t[1]] +
-                  root * v * mesh.vertices[t[2]]);
+    const Vec3f &a = mesh.vertices[t[0]], &b = mesh.vertices[t[1]], &c = mesh.vertices[t[2]];
+    out.push_back((1 - root) * a + root * (1 - v) * b + root * v * c);
+    if (normals) normals->push_back((b - a).cross(c - a).normalized());
   }
   return out;
 }

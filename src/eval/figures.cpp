@@ -136,15 +136,20 @@ Figures figures_of(const Judged& judged, const std::string& name,
   Figures out;
   out.name = name;
   int asked_40 = 0, found_40 = 0, asked_70 = 0, found_70 = 0, withheld = 0;
+  int told_40 = 0, told_found = 0, told_withheld = 0;
   for (const JudgedTruth& truth : judged.truths) {
     if (!wanted(truth.level, truth.part)) continue;
     asked_40 += truth.visible >= 0.4, found_40 += truth.visible >= 0.4 && truth.answer >= 0;
     withheld += truth.visible >= 0.4 && truth.withheld;
+    if (truth.visible >= 0.4 && truth.in_view)
+      ++told_40, told_found += truth.answer >= 0, told_withheld += truth.withheld;
     asked_70 += truth.visible >= 0.7, found_70 += truth.visible >= 0.7 && truth.answer >= 0;
   }
   out.recall_40 = share_of(found_40, asked_40);
   out.recall_70 = share_of(found_70, asked_70);
   out.withheld = share_of(withheld, asked_40);
+  out.recall_told = share_of(told_found, told_40);
+  out.withheld_told = share_of(told_withheld, told_40);
   int given = 0, wrong = 0, right_ones = 0, undecided = 0;
   std::vector<double> mm, deg, ratio_mm, ratio_deg;
   for (const JudgedAnswer& answer : judged.answers) {

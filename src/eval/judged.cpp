@@ -8,6 +8,9 @@
 #include "eval/bop_files.hpp"
 #include "tribin/core/parallel.hpp"
 #include "tribin/eval/bop_dataset.hpp"
+#include "tribin/eval/in_view.hpp"
+#include "tribin/io/cad_files.hpp"
+#include "tribin/io/scan_files.hpp"
 
 namespace tribin::eval {
 namespace {
@@ -110,19 +113,19 @@ Judged judge_image(const Image& image, std::span<const Model> models, double min
   if (result.seconds >= 0) out.seconds.push_back(result.seconds);
 
   std::vector<Truth> offered;  // what was not looked for is not asked for
-  for (const Truth& truth : all)
-    if (!result.offered || std::count(result.offered->begin(), result.offered->end(), truth.part))
-      offered.push_back(truth);
+  std::vector<int> place;      // of these among all
+  for (std::size_t t = 0; t < all.size(); ++t)
+    if (!result.offered || std::count(result.offered->begin(), result.offered->end(), all[t].part)) {
+      offered.push_back(all[t]);
+      place.push_back(static_cast<int>(t));
+    }
   const Judgement judged = judge(result.instances, offered, models);
   std::vector<char> taken(all.size(), 0), right(result.instances.size(), 0);
   std::vector<int> answer_of(offered.size(), -1);
   for (const Match& match : judged.found) {
     right[match.answer] = 1;
     answer_of[match.truth] = match.answer;
-    for (std::size_t t = 0, k = 0; t < all.size(); ++t) {
-      if (result.offered && !std::count(result.offered->begin(), result.offered->end(), all[t].part)) continue;
-      if (static_cast<int>(k++) == match.truth) taken[t] = 1;
-    }
+    taken[place[match.truth]] = 1;
   }
   for (std::size_t a = 0; a < result.instances.size(); ++a) {
     const Instance& instance = result.instances[a];
@@ -158,6 +161,7 @@ Judged judge_image(const Image& image, std::span<const Model> models, double min
     truth.scene = image.truth->scene, truth.image = image.truth->image, truth.level = image.truth->level;
     truth.part = offered[t].part;
     truth.visible = offered[t].visible_fraction;
+    truth.place = place[t];
     truth.answer = answer_of[t];
     truth.at_mm = center_of(model, offered[t].camera_from_part);
     if (truth.answer < 0)
@@ -193,6 +197,29 @@ const char* name_of(Verdict verdict) {
   static constexpr const char* kNames[] = {"found",       "not_asked",   "duplicate",    "flip",
                                            "wrong_class", "wrong_place", "nothing_there"};
   return kNames[static_cast<int>(verdict)];
+}
+
+void mark_in_view(Judged& judged, std::span<const ImageTruth> images, std::span<const Model> models,
+                  const fs::path& dataset, const std::string& split, const fs::path& models_dir) {
+  std::map<std::string, RenderMesh> meshes;
+  std::map<std::pair<int, int>, const ImageTruth*> image_of;
+  for (const BopObject& object : list_bop_objects(models_dir))
+    meshes.emplace(object.name, make_render_mesh(read_cad(object.file)));
+  for (const ImageTruth& image : images) image_of[{image.scene, image.image}] = &image;
+  std::map<std::pair<int, int>, std::vector<JudgedTruth*>> truths_of;
+  for (JudgedTruth& truth : judged.truths) truths_of[{truth.scene, truth.image}].push_back(&truth);
+  for (const BopTask& task : list_bop_tasks(dataset, split, {}, list_bop_objects(models_dir))) {
+    const auto truths = truths_of.find({task.scene, task.image});
+    if (truths == truths_of.end()) continue;
+    const Scan scan = read_scan(task.depth, {.camera_file = task.camera, .image_id = task.image});
+    const std::vector<Truth>& all = image_of.at({task.scene, task.image})->truths;
+    parallel_each(static_cast<int>(truths->second.size()), [&](int i) {
+      JudgedTruth& truth = *truths->second[static_cast<std::size_t>(i)];
+      truth.in_view = feature_in_view(scan, meshes.at(truth.part), model_of_part(models, truth.part).near_symmetries,
+                                      all[truth.place].camera_from_part);
+    });
+  }
+  judged.in_view_known = true;
 }
 
 double chi_square(const Instance& answer, const Pose& truth) {

@@ -76,6 +76,14 @@ std::string tables(const std::vector<Figures>& groups) {
   return out;
 }
 
+std::string in_view_text(const std::vector<Figures>& groups) {
+  std::string out =
+      line("\n%-22s %-28s %-28s", "telling feature in view", "found of >= 40 % visible", "listed as uncertain");
+  for (const Figures& f : groups)
+    out += line("%-22s %-28s %-28s", f.name.c_str(), words(f.recall_told).c_str(), words(f.withheld_told).c_str());
+  return out;
+}
+
 std::string confidence_text(const Confidence& c, bool uncertainty) {
   std::string out;
   if (uncertainty) {
@@ -97,9 +105,10 @@ std::string list_text(const Judged& judged) {
   std::string out = line("\nmissed parts that show >= 40 %%:");
   for (const JudgedTruth& t : judged.truths)
     if (t.answer < 0 && t.visible >= 0.4)
-      out += line("  scene %d image %d %s %s, visible %.2f, at (%.1f, %.1f, %.1f)%s%s%s", t.scene, t.image,
+      out += line("  scene %d image %d %s %s, visible %.2f, at (%.1f, %.1f, %.1f)%s%s%s%s", t.scene, t.image,
                   t.level.c_str(), t.part.c_str(), t.visible, t.at_mm.x(), t.at_mm.y(), t.at_mm.z(),
-                  t.withheld ? ", listed as uncertain" : "", t.reason.empty() ? "" : ": ", t.reason.c_str());
+                  t.withheld ? ", listed as uncertain" : "", t.in_view ? "" : ", its telling feature is hidden",
+                  t.reason.empty() ? "" : ": ", t.reason.c_str());
   out += line("false answers:");
   for (const JudgedAnswer& a : judged.answers)
     if (eval::is_false(a.verdict))
@@ -140,6 +149,8 @@ Json figures_json(const Figures& f) {
           {"confusions", share_json(f.confusions)},
           {"undecided", share_json(f.undecided)},
           {"withheld", share_json(f.withheld)},
+          {"recall_in_view", share_json(f.recall_told)},
+          {"withheld_in_view", share_json(f.withheld_told)},
           {"told", f.told},
           {"translation_mm", {{"median", estimate_json(f.median_mm)}, {"quantile_95", estimate_json(f.high_mm)}}},
           {"rotation_deg", {{"median", estimate_json(f.median_deg)}, {"quantile_95", estimate_json(f.high_deg)}}},
@@ -178,7 +189,9 @@ std::string eval_text(const Judged& judged, bool list) {
   if (!judged.seconds.empty())
     out += line("seconds an image: median %s, 95 %% %s", words(eval::quantile_estimate(judged.seconds, 0.5), 2).c_str(),
                 words(eval::quantile_estimate(judged.seconds, 0.95), 2).c_str());
-  out += "\n" + tables(eval::all_figures(judged));
+  const std::vector<Figures> groups = eval::all_figures(judged);
+  out += "\n" + tables(groups);
+  if (judged.in_view_known) out += in_view_text(groups);
   if (!judged.answers.empty()) out += confidence_text(eval::confidence_of(judged), judged.uncertainty);
   if (list) out += list_text(judged);
   return out;
@@ -192,6 +205,7 @@ std::string eval_json(const Judged& judged) {
   out["given_without_parts"] = judged.given_without_parts;
   out["seconds"] = {{"median", estimate_json(eval::quantile_estimate(judged.seconds, 0.5))},
                     {"quantile_95", estimate_json(eval::quantile_estimate(judged.seconds, 0.95))}};
+  out["in_view_known"] = judged.in_view_known;
   out["groups"] = Json::array();
   for (const Figures& figures : eval::all_figures(judged)) out["groups"].push_back(figures_json(figures));
   out["confidence"] = confidence_json(eval::confidence_of(judged));
@@ -204,6 +218,7 @@ std::string eval_json(const Judged& judged) {
                                {"visible_fraction", json::rounded(t.visible, 4)},
                                {"at_mm", json::millimetres(t.at_mm)},
                                {"uncertain", t.withheld},
+                               {"in_view", t.in_view},
                                {"reason", t.reason}});
   out["false_answers"] = Json::array();
   for (const JudgedAnswer& a : judged.answers)

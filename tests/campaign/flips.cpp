@@ -16,53 +16,17 @@
 #include "support/near_symmetric.hpp"
 #include "tribin/core/error.hpp"
 #include "tribin/eval/bop_dataset.hpp"
+#include "tribin/eval/in_view.hpp"
 #include "tribin/eval/judged.hpp"
 #include "tribin/io/cad_files.hpp"
 #include "tribin/io/scan_files.hpp"
 #include "tribin/io/write.hpp"
 #include "tribin/part/symmetry.hpp"
-#include "tribin/pose/index_render.hpp"
 
 namespace {
 
 namespace fs = std::filesystem;
 using namespace tribin;
-
-constexpr int kTellingPixels = 25;
-constexpr double kTellingMm = 0.5, kInFrontMm = 2;
-
-Image<float> rendered(const RenderMesh& mesh, const PinholeCamera& camera, const Pose& pose) {
-  IndexRender render;
-  render_index(mesh, camera, pose, 1, render);
-  Image<float> z(camera.width, camera.height, 0);
-  for (int j = 0; j < render.height; ++j)
-    for (int i = 0; i < render.width; ++i) {
-      const float inverse = render.inverse_z[render.index(i, j)];
-      const int u = render.u0 + i, v = render.v0 + j;
-      if (inverse > 0 && u >= 0 && v >= 0 && u < camera.width && v < camera.height) z(u, v) = 1 / inverse;
-    }
-  return z;
-}
-
-/// Measured pixels at which the two poses differ, not hidden by anything that the scan shows in front of both.
-int telling_pixels(const Scan& scan, const Image<float>& a, const Image<float>& b) {
-  int count = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    const float measured = scan.z_mm.data[i], za = a.data[i], zb = b.data[i];
-    if (!(measured > 0) || (za == 0 && zb == 0)) continue;
-    const float nearest = za == 0 ? zb : zb == 0 ? za : std::min(za, zb);
-    if (measured < nearest - kInFrontMm) continue;
-    count += za == 0 || zb == 0 || std::abs(za - zb) > kTellingMm;
-  }
-  return count;
-}
-
-bool feature_in_view(const Scan& scan, const RenderMesh& mesh, const eval::Model& model, const Pose& truth) {
-  const Image<float> there = rendered(mesh, scan.camera, truth);
-  return std::all_of(model.near_symmetries.begin(), model.near_symmetries.end(), [&](const Pose& turn) {
-    return telling_pixels(scan, there, rendered(mesh, scan.camera, truth * turn)) >= kTellingPixels;
-  });
-}
 
 struct Tally {
   std::string name;
@@ -138,7 +102,7 @@ int run(int wanted, const std::string& level, const std::string& seed) {
       const std::size_t m = static_cast<std::size_t>(
           std::find_if(models.begin(), models.end(), [&](const auto& x) { return x.name == truth.part; }) -
           models.begin());
-      const bool in_view = feature_in_view(scan, meshes[m], models[m], truth.camera_from_part);
+      const bool in_view = eval::feature_in_view(scan, meshes[m], models[m].near_symmetries, truth.camera_from_part);
       const bool right = judgement.answer >= 0;
       const eval::JudgedAnswer* flip = nullptr;
       for (const eval::JudgedAnswer& answer : judged.answers)

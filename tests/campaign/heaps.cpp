@@ -41,7 +41,7 @@ bool run_level(const Run& run) {
   const fs::path targets = without_parts ? fs::path() : data / "test_targets_bop19.json";
   const fs::path results = run_bop(data, targets);
   if (results.empty()) return false;
-  std::vector<std::string> eval = {"eval", data.string(), results.string(), "--list"};
+  std::vector<std::string> eval = {"eval", data.string(), results.string(), "--list", "--in-view"};
   if (!without_parts) eval.insert(eval.end(), {"--targets", targets.string()});
   return run_tribin(eval);
 }

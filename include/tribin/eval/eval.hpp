@@ -72,8 +72,10 @@ Model model_of(const Part& part);
 /// cannot tell apart. \param model  with its surface.
 double overlap(const Model& model, const Pose& a, const Pose& b, double limit_mm);
 
-/// `count` points on the triangles, in equal shares of area. \source van der Corput's sequences in place of chance.
-std::vector<Vec3f> points_on(const Mesh& mesh, int count);
+/// `count` points on the triangles, in equal shares of area, any prefix too; none on a mesh without area.
+/// \param normals  gets the facet normal of each, if given.
+/// \source van der Corput's sequences in place of chance.
+std::vector<Vec3f> points_on(const Mesh& mesh, int count, std::vector<Vec3f>* normals = nullptr);
 
 /// The models of a BOP data set, with the true symmetries of models_info.json, in the order of the object ids; the name
 /// is its `name`, or obj_%06d.

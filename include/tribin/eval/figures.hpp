@@ -20,6 +20,7 @@ struct Figures {
   Share flips, confusions;                   ///< of all that is given out
   Share undecided;                           ///< right ones with alternatives, of all right ones
   Share withheld;                            ///< parts >= 40 % visible that are listed as uncertain instead
+  Share recall_told, withheld_told;          ///< found, and uncertain, of those whose telling feature is in view
   int told = 0;                              ///< false ones whose alternatives hold the truth
   Estimate median_mm, high_mm;               ///< of the found: median and 95 % of the translation error
   Estimate median_deg, high_deg;             ///< of the rotation error

@@ -44,8 +44,10 @@ struct JudgedTruth {
   int scene = 0, image = 0;
   std::string level, part;
   double visible = 0;
+  int place = 0;              ///< in ImageTruth::truths
   int answer = -1;            ///< index of the right answer; -1 = missed
   Vec3 at_mm = Vec3::Zero();  ///< the box's centre, camera frame
+  bool in_view = true;        ///< the scan shows what tells it from its self-similar poses; see mark_in_view
   bool withheld = false;      ///< missed, but listed as uncertain at its place
   std::string reason;         ///< missed: what the nearest refused candidate fell to, where the results tell
 };
@@ -60,6 +62,7 @@ struct Judged {
   int given_without_parts = 0;    ///< answers in those
   std::vector<double> seconds;    ///< of the images, where known
   bool uncertainty = false;       ///< the results tell covariances
+  bool in_view_known = false;     ///< mark_in_view was called
 };
 
 /// An image to be judged.
@@ -78,6 +81,12 @@ std::vector<ImageTruth> read_truths(const std::filesystem::path& dataset, const 
 /// \param min_visible  parts that show less are not asked for.
 Judged judge_results(std::span<const ImageTruth> images, std::span<const ImageResult> results,
                      std::span<const Model> models, double min_visible = 0.4);
+
+/// Finds out for each truth whether the scan tells it from its self-similar poses (`near_symmetries_discrete`), as
+/// in_view.hpp has it: reads the scans and the models again. \param images, models  those that were judged.
+void mark_in_view(Judged& judged, std::span<const ImageTruth> images, std::span<const Model> models,
+                  const std::filesystem::path& dataset, const std::string& split,
+                  const std::filesystem::path& models_dir);
 
 /// Mahalanobis distance squared of an answer from the truth, free directions left out; the rank is 6 - their number.
 /// \param truth  already turned by the symmetry that brings it closest.
