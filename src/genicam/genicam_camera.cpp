@@ -131,7 +131,10 @@ class GenicamCamera : public Camera {
     const guint payload = call(name_, "size of a picture", arv_camera_get_payload, camera_.get());
     const std::size_t count = group.end - group.begin;
     while (ArvBuffer* old = arv_stream_try_pop_buffer(stream_.get())) g_object_unref(old);  // of an attempt before
-    for (std::size_t i = 0; i < count; ++i) arv_stream_push_buffer(stream_.get(), arv_buffer_new_allocate(payload));
+    gint waiting = 0, done = 0;  // an attempt that was broken off left buffers in the stream: they serve again
+    arv_stream_get_n_buffers(stream_.get(), &waiting, &done);
+    for (std::size_t i = static_cast<std::size_t>(std::max(0, waiting)); i < count; ++i)
+      arv_stream_push_buffer(stream_.get(), arv_buffer_new_allocate(payload));
     call(name_, "start", arv_camera_start_acquisition, camera_.get());
     const struct Stop {
       ArvCamera* camera;
