@@ -39,6 +39,45 @@ TEST(RenderIndex, SeesTheDepthOfAPlaneFace) {
     if (render.triangle[i] >= 0) EXPECT_NEAR(1 / render.inverse_z[i], 500, 1e-3);
 }
 
+/// 1/z of the first facet that a ray of the camera meets; 0 = none.
+double cast(const Mesh& mesh, const Pose& pose, const Vec3& ray) {
+  double nearest = 0;
+  for (const auto& t : mesh.triangles) {
+    Eigen::Matrix3d m;  // the ray is a positive sum of the corners where it meets the triangle: m s = ray, sum(s) = 1/z
+    for (int k = 0; k < 3; ++k) m.col(k) = pose * mesh.vertices[t[static_cast<std::size_t>(k)]].cast<double>();
+    if (std::abs(m.determinant()) < 1e-9) continue;
+    const Eigen::Vector3d s = m.inverse() * Eigen::Vector3d(ray);
+    if (s.minCoeff() >= 0) nearest = std::max(nearest, s.sum());
+  }
+  return nearest;
+}
+
+TEST(RenderIndex, SeesWhatRaysMeet) {
+  const Mesh mesh = stepped_block();
+  const RenderMesh render_mesh = make_render_mesh(mesh);
+  const PinholeCamera camera{120, 90, 700, 650, 57.3, 44.1};
+  for (unsigned seed = 1; seed <= 20; ++seed) {
+    SCOPED_TRACE(seed);
+    Pose pose = test::random_pose(600, seed);
+    pose.translation() += Eigen::Vector3d(seed % 3 ? 0 : 40, seed % 4 ? 0 : -30, 0);  // some are cut by the border
+    const int step = 1 + static_cast<int>(seed % 3);
+    IndexRender render;
+    render_index(render_mesh, camera, pose, step, render);
+    int seen = 0, wrong = 0;
+    for (int v = 0; v < camera.height; v += step)
+      for (int u = 0; u < camera.width; u += step) {
+        const int i = (u - render.u0) / step, j = (v - render.v0) / step;
+        const bool inside = u >= render.u0 && v >= render.v0 && i < render.width && j < render.height;
+        const double rendered = inside ? render.inverse_z[render.index(i, j)] : 0;
+        const double truth = cast(mesh, pose, camera.ray(u, v));
+        seen += truth > 0;
+        wrong += std::abs(rendered - truth) > 1e-5 * truth;
+      }
+    EXPECT_GT(seen, 100);
+    EXPECT_LE(wrong, seen / 500 + 1);  // a ray through an edge may go either way
+  }
+}
+
 TEST(RefinePose, MeetsTheTruthWithinTheNoise) {
   const Mesh mesh = stepped_block();
   const RenderMesh render_mesh = make_render_mesh(mesh);
