@@ -90,7 +90,9 @@ eval::ImageResult ours(const Scan& scan, const Stock& stock, const eval::BopTask
   return out;
 }
 
-/// Nothing when the peer failed.
+constexpr int kMostSeconds = 600;  // for one scene, training included: a cell waits for one or two
+
+/// Nothing when the peer failed, or took too long.
 std::optional<eval::ImageResult> of_peer(const PosePeer& peer, const Scan& scan, const Stock& stock,
                                          const eval::BopTask& task, const fs::path& cloud) {
   std::vector<fs::path> files;
@@ -101,7 +103,7 @@ std::optional<eval::ImageResult> of_peer(const PosePeer& peer, const Scan& scan,
       names.push_back(stock.objects[k].name);
     }
   const fs::path answer = cloud.parent_path() / "poses";
-  const auto times = run_peer(peer_folder() / peer.program, cloud, answer, scan.camera, files);
+  const auto times = run_peer(peer_folder() / peer.program, cloud, answer, scan.camera, files, kMostSeconds);
   if (!times.count("ms")) return std::nullopt;
   eval::ImageResult out;
   out.seconds = times.at("ms") / 1000;
@@ -169,7 +171,7 @@ std::string compare_heaps(const fs::path& dataset, int scenes) {
       out += row(name, truths, results[m], stock);
     else
       out += std::string("  ") + name +
-             (failed[m] ? ": failed\n"
+             (failed[m] ? ": failed, or took longer than " + std::to_string(kMostSeconds) + " s for one scene\n"
                         : std::string(": not built (install ") + kPeers[m - 1].package +
                               ", configure with -DTRIBIN_PEERS=ON)\n");
   }

@@ -12,8 +12,9 @@ namespace fs = std::filesystem;
 fs::path peer_folder() { return fs::read_symlink("/proc/self/exe").parent_path() / "peers"; }
 
 std::map<std::string, double> run_peer(const fs::path& program, const fs::path& in, const fs::path& out,
-                                       const PinholeCamera& camera, const std::vector<fs::path>& models) {
+                                       const PinholeCamera& camera, const std::vector<fs::path>& models, int most_s) {
   std::string command;
+  if (most_s > 0) command = "timeout " + std::to_string(most_s) + " ";
   for (const fs::path& word : {program, in, out}) command += "'" + word.string() + "' ";
   command += std::to_string(camera.width) + " " + std::to_string(camera.height);
   for (const double x : {camera.fx, camera.fy, camera.cx, camera.cy}) command += " " + std::to_string(x);
