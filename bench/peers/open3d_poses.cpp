@@ -16,7 +16,9 @@ using open3d::geometry::PointCloud;
 namespace registration = open3d::pipelines::registration;
 
 // Settings of Open3D's own tutorial for global registration, in voxels; the voxel is 1/40 of the median part.
-constexpr double kFeatureVoxels = 5, kMatchVoxels = 1.5, kIcpVoxels = 0.4;
+constexpr double kFeatureVoxels = 5, kMatchVoxels = 1.5;
+// Both clouds are thinned: neighbours lie up to a voxel apart, where the tutorial refines whole clouds at 0.4.
+constexpr double kIcpVoxels = 1;
 // A part shows half of its surface at best, and the tutorial calls 0.3 of a whole overlap a fit: half of that and more.
 constexpr double kLeastFitness = 0.2;
 constexpr int kMostParts = 60, kMostFailures = 2;
