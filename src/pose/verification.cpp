@@ -6,18 +6,21 @@
 namespace tribin {
 namespace {
 
-// Outside of the outline the scan is looked at two rendered pixels away: beside the mixed pixels of the edge.
-constexpr int kOutside = 2;
+// Outside of the outline the scan is looked at two rendered pixels away, beside the mixed pixels of the edge; where
+// nothing is measured, up to three more, across the pits of a surface that is measured here and there.
+constexpr int kOutside = 2, kFarthest = 5;
+
+enum class Beside { goes_on, ends, jumps };
 
 /// Does the scene end or jump at full-image pixel (u, v), seen from a facet (normal n, n . x = rho) at depth z?
-bool breaks_off(const SceneDepth& scene, int u, int v, const Vec3f& n, double rho, double z, double plane_tolerance,
-                double depth_tolerance) {
-  if (!scene.z_mm.contains(u, v)) return false;  // the image's border proves nothing
+Beside beside(const SceneDepth& scene, int u, int v, const Vec3f& n, double rho, double z, double plane_tolerance,
+              double depth_tolerance) {
+  if (!scene.z_mm.contains(u, v)) return Beside::goes_on;  // the image's border proves nothing
   const float z_out = scene.z_mm(u, v);
-  if (!(z_out > 0)) return true;
-  if (std::abs(z_out - z) > depth_tolerance) return true;
+  if (!(z_out > 0)) return Beside::ends;
+  if (std::abs(z_out - z) > depth_tolerance) return Beside::jumps;
   const Vec3 p = scene.camera.point(u, v, z_out);
-  return std::abs(n.cast<double>().dot(p) - rho) > plane_tolerance;
+  return std::abs(n.cast<double>().dot(p) - rho) > plane_tolerance ? Beside::jumps : Beside::goes_on;
 }
 
 }  // namespace
@@ -86,8 +89,15 @@ Verification verify_pose(const RenderMesh& mesh, const SceneDepth& scene, const 
             ii < 0 || jj < 0 || ii >= render.width || jj >= render.height || render.triangle[render.index(ii, jj)] < 0;
         if (!outside) continue;
         ++out.outline;
-        out.outline_breaks += breaks_off(scene, u + d[0] * kOutside * render.step, v + d[1] * kOutside * render.step, n,
-                                         rho, z_model, plane_tolerance, depth_tolerance);
+        Beside seen = Beside::ends;
+        for (int far = kOutside; far <= kFarthest && seen == Beside::ends; ++far) {
+          const Beside there = beside(scene, u + d[0] * far * render.step, v + d[1] * far * render.step, n, rho,
+                                      z_model, plane_tolerance, depth_tolerance);
+          // Farther away another surface proves nothing, but this one, going on, does.
+          if (far == kOutside || there == Beside::goes_on) seen = there;
+        }
+        out.outline_breaks += seen != Beside::goes_on;
+        out.outline_jumps += seen == Beside::jumps;
       }
     }
   }

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "likelihood.hpp"
 #include "render_scores.hpp"
 #include "tribin/core/parallel.hpp"
 #include "tribin/pose/look_up.hpp"
@@ -86,11 +87,11 @@ std::vector<Pose> rivals(const SceneDepth& scene, const Part& part, const Pose& 
 
 struct Finalist {
   Pose pose = Pose::Identity();
-  double log_likelihood = 0;
+  double log_likelihood = 0;              ///< against the likeliest, once ranked
   Matrix6 information = Matrix6::Zero();  ///< of its refinement
 };
 
-/// Refines every pose at a render step and sorts them by likelihood, best first.
+/// Refines every pose at a render step and ranks them, the likeliest first.
 void compare(const SceneDepth& scene, const Part& part, int step, int iterations, double start_mm,
              std::vector<Finalist>& finalists) {
   RefineOptions options = refine_options(part, step, iterations, std::max(start_mm, 4 * scene.median_sigma_mm));
@@ -103,10 +104,13 @@ void compare(const SceneDepth& scene, const Part& part, int step, int iterations
   });
   std::vector<std::pair<const Part*, Pose>> poses;
   for (const Finalist& f : finalists) poses.emplace_back(&part, f.pose);
-  const std::vector<double> likelihood = log_likelihoods(scene, poses, step);
-  for (std::size_t i = 0; i < finalists.size(); ++i) finalists[i].log_likelihood = likelihood[i];
-  std::stable_sort(finalists.begin(), finalists.end(),
-                   [](const Finalist& a, const Finalist& b) { return a.log_likelihood > b.log_likelihood; });
+  const Ranking ranking = rank_poses(scene, poses, step);
+  std::vector<Finalist> ranked;
+  for (std::size_t i = 0; i < ranking.order.size(); ++i) {
+    ranked.push_back(finalists[ranking.order[i]]);
+    ranked.back().log_likelihood = ranking.log_odds[i];
+  }
+  finalists = std::move(ranked);
 }
 
 /// The pose moved to both sides along the direction that its information holds least: slots and steps make local minima
@@ -163,58 +167,6 @@ CellMask mask_of(const Part& part, const SceneDepth& scene, const PoseCandidate&
     }
   for (const std::uint64_t b : mask.bits) mask.count += std::popcount(b);
   return mask;
-}
-
-std::vector<double> log_likelihoods(const SceneDepth& scene, std::span<const std::pair<const Part*, Pose>> poses,
-                                    int step_px) {
-  // All poses are judged on the union of their windows: what one explains and another does not counts against the
-  // other.
-  constexpr float kUnexplained = 0.5f * 16;  // 4 sigma, and what a pixel costs that no surface explains
-  std::vector<IndexRender> renders(poses.size());
-  int u0 = scene.camera.width, v0 = scene.camera.height, u1 = -1, v1 = -1;
-  parallel_each(static_cast<int>(poses.size()), [&](int i) {
-    const auto k = static_cast<std::size_t>(i);
-    render_index(poses[k].first->render_mesh, scene.camera, poses[k].second, step_px, renders[k]);
-  });
-  for (const IndexRender& r : renders) {
-    if (r.width == 0) continue;
-    u0 = std::min(u0, r.u0);
-    v0 = std::min(v0, r.v0);
-    u1 = std::max(u1, r.u0 + (r.width - 1) * step_px);
-    v1 = std::max(v1, r.v0 + (r.height - 1) * step_px);
-  }
-  std::vector<double> out(poses.size(), 0.0);
-  for (int v = v0; v <= v1; v += step_px)
-    for (int u = u0; u <= u1; u += step_px) {
-      const float z = scene.z_mm(u, v);
-      if (!(z > 0)) continue;
-      bool any = false;
-      for (const IndexRender& r : renders) {
-        const int i = (u - r.u0) / step_px, j = (v - r.v0) / step_px;
-        any = any || (u >= r.u0 && v >= r.v0 && i < r.width && j < r.height && r.triangle[r.index(i, j)] >= 0);
-      }
-      if (!any) continue;
-      for (std::size_t k = 0; k < poses.size(); ++k) {
-        const IndexRender& r = renders[k];
-        const int i = (u - r.u0) / step_px, j = (v - r.v0) / step_px;
-        const bool inside = u >= r.u0 && v >= r.v0 && i < r.width && j < r.height;
-        const std::int32_t triangle = inside ? r.triangle[r.index(i, j)] : -1;
-        double cost = kUnexplained;
-        if (triangle >= 0) {
-          const Vec3 ray = scene.camera.ray(u, v);
-          const double slant =
-              std::max(0.2, std::abs(r.normal[static_cast<std::size_t>(triangle)].cast<double>().dot(ray)));
-          const double sigma = std::hypot(scene.sigma_mm(u, v) * slant, poses[k].first->mesh.chord_error_mm);
-          const double e = (z - 1.0 / r.inverse_z[r.index(i, j)]) * slant / sigma;
-          cost = std::min(0.5 * e * e, static_cast<double>(kUnexplained));
-        }
-        out[k] -= cost;
-      }
-    }
-  // Pixels closer than the noise's correlation tell the same story.
-  const double inflation = std::max(1.0, correlation_inflation(scene.correlation_px) / (double(step_px) * step_px));
-  for (double& l : out) l /= inflation;
-  return out;
 }
 
 PoseCandidate settled_on_scan(const SceneDepth& scene, const Part& part, const PoseCandidate& candidate) {
@@ -333,7 +285,6 @@ Polished polish_once(const SceneDepth& scene, std::span<const Part> parts, const
   if (finalists[0].information != Matrix6::Zero()) out.candidate.information = finalists[0].information;
   out.candidate.verification = verify_pose(part.render_mesh, scene, finalists[0].pose,
                                            verification_options(part, fine, 0.002 * part.diameter_mm));
-  out.log_likelihood = finalists[0].log_likelihood;
   out.mask = mask_of(part, scene, out.candidate);
   for (const Finalist& f : finalists)
     if (!close_poses(part, f.pose, finalists[0].pose, 0.02 * part.diameter_mm, 4 * kDegree))

@@ -20,17 +20,12 @@ struct CellMask {
 struct Polished {
   PoseCandidate candidate;
   CellMask mask;
-  double log_likelihood = 0;                    ///< of the pixels in `window`, noise and correlation counted
-  std::vector<std::pair<Pose, double>> others;  ///< self-similar poses and their log-likelihood, best first
+  std::vector<std::pair<Pose, double>> others;  ///< self-similar poses and the log of their odds against it, best first
+  double class_odds = 0;                        ///< summed odds of other parts in its place against it
 };
 
 /// The cells whose pixels a rendered pose supports.
 CellMask mask_of(const Part& part, const SceneDepth& scene, const PoseCandidate& candidate);
-
-/// Log-likelihood of the scan where any of the poses predicts something: each pixel's residual in its local sigma,
-/// bounded at 4 sigma, over the equivalent number of independent pixels. Only differences between poses mean something.
-std::vector<double> log_likelihoods(const SceneDepth& scene, std::span<const std::pair<const Part*, Pose>> poses,
-                                    int step_px);
 
 /// Worth a fit on more pixels? By its verification on a thousand.
 bool hopeful(const Part& part, const PoseCandidate& candidate, std::vector<Reason>& rejected);

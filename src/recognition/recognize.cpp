@@ -6,6 +6,7 @@
 
 #include "choice.hpp"
 #include "instance_report.hpp"
+#include "likelihood.hpp"
 #include "tribin/core/error.hpp"
 #include "tribin/core/parallel.hpp"
 
@@ -73,16 +74,11 @@ Instance make_instance(const Polished& p, std::span<const Part> parts, const Sce
   describe_uncertainty(part, noise, refined, out);
   describe_evidence(part, scene, features, out);
 
-  // Rivals by likelihood: those that keep 1 % are told. Errors of a scan that are common to whole faces, and rasters
-  // that fall otherwise, move a log-likelihood by a few nats where nothing decides; what decides moves it by hundreds.
-  constexpr double kTemperature = 3;
-  const auto weight = [&](double likelihood) {
-    return std::exp(std::min(0.0, likelihood - p.log_likelihood) / kTemperature);
-  };
+  // Self-similar poses: those that keep 1 % are told.
   double sum = 1;
-  for (const auto& [pose, likelihood] : p.others) sum += weight(likelihood);
-  for (const auto& [pose, likelihood] : p.others) {
-    const double probability = weight(likelihood) / sum;
+  for (const auto& [pose, log_odds] : p.others) sum += std::exp(log_odds);
+  for (const auto& [pose, log_odds] : p.others) {
+    const double probability = std::exp(log_odds) / sum;
     if (probability < 0.01) continue;
     Alternative a;
     a.camera_from_part = pose;
@@ -97,6 +93,7 @@ Instance make_instance(const Polished& p, std::span<const Part> parts, const Sce
   double main = 1;
   for (const Alternative& a : out.alternatives) main -= a.probability;
   const auto [place, turn] = predicted_errors(part, out);
+  main /= 1 + p.class_odds;
   // "Found" is 5 % of the diameter at the rim, half a diameter from the centre.
   out.score = probability(v) *
               probability_below(0.05 * part.diameter_mm, std::hypot(place, turn * 0.5 * part.diameter_mm)) * main;
@@ -199,26 +196,23 @@ std::vector<Polished> choose(const SceneDepth& scene, std::span<const Part> part
       }
     }
     if (polished.empty()) continue;
-    std::size_t best = 0;
-    std::vector<double> likelihood(polished.size(), 0.0);
-    if (polished.size() > 1) {
-      std::vector<std::pair<const Part*, Pose>> poses;
-      for (const Polished& p : polished)
-        poses.emplace_back(&parts[static_cast<std::size_t>(p.candidate.part)], p.candidate.camera_from_part);
-      likelihood = log_likelihoods(scene, poses, step_for(*poses[0].first, scene, poses[0].second, 6000));
-      best = static_cast<std::size_t>(std::max_element(likelihood.begin(), likelihood.end()) - likelihood.begin());
-    }
+    std::vector<std::pair<const Part*, Pose>> poses;
+    for (const Polished& p : polished)
+      poses.emplace_back(&parts[static_cast<std::size_t>(p.candidate.part)], p.candidate.camera_from_part);
+    const Ranking ranking = rank_poses(scene, poses, step_for(*poses[0].first, scene, poses[0].second, 6000));
+    const std::size_t best = ranking.order[0];
     Polished& winner = polished[best];
     const Part& part = parts[static_cast<std::size_t>(winner.candidate.part)];
     if (!acceptable(part, winner.candidate, rejected)) {
       for (const std::size_t k : rivals) refused.candidates.push_back(candidates[k]);
       continue;
     }
-    for (std::size_t k = 0; k < polished.size(); ++k) {
-      if (k == best) continue;
-      const Part& other = parts[static_cast<std::size_t>(polished[k].candidate.part)];
-      add_reason(rejected, {other.name, "selection", "log_likelihood", likelihood[k] - likelihood[best], 0, 1,
-                            place_of(other, polished[k].candidate)});
+    for (std::size_t r = 1; r < ranking.order.size(); ++r) {
+      const Polished& loser = polished[ranking.order[r]];
+      const Part& other = parts[static_cast<std::size_t>(loser.candidate.part)];
+      winner.class_odds += std::exp(ranking.log_odds[r]);
+      add_reason(rejected,
+                 {other.name, "selection", "log_odds", ranking.log_odds[r], 0, 1, place_of(other, loser.candidate)});
     }
     claimed.join(winner.mask);
     winners.push_back(std::move(winner));

@@ -213,7 +213,7 @@ std::string sentence_of(const Reason& r) {
       {"contour", "Its outline does not meet the scan's depth edges"},
       {"residual", "The scan does not lie on its surface"},
       {"radius_mm", "A radius does not fit"},
-      {"log_likelihood", "Another pose explains the same points better"},
+      {"log_odds", "Another part explains the same points better"},
       {"overlap", "Another instance explains the same points"},
       {"pixels", "Too few pixels would hold it"},
       {"visible_fraction", "Too little of it would be visible"},
