@@ -93,6 +93,7 @@ CameraFile from_object(const std::string& file, const std::string& place, const 
   for (const auto& [key, field] : {std::pair{"noise_mm", &noise.sigma_mm},
                                    {"noise_correlation_px", &noise.correlation_px},
                                    {"scale_error", &noise.scale_error},
+                                   {"shape_error", &noise.shape_error},
                                    {"offset_mm", &noise.offset_mm}}) {
     if (!object.contains(key)) continue;
     *field = number(file, place, object, key);
@@ -144,6 +145,7 @@ void write_camera_file(const std::filesystem::path& path, const CameraFile& file
   if (file.noise.sigma_mm > 0) out["noise_mm"] = file.noise.sigma_mm;
   if (file.noise.correlation_px >= 0) out["noise_correlation_px"] = file.noise.correlation_px;
   if (file.noise.scale_error > 0) out["scale_error"] = file.noise.scale_error;
+  if (file.noise.shape_error > 0) out["shape_error"] = file.noise.shape_error;
   if (file.noise.offset_mm > 0) out["offset_mm"] = file.noise.offset_mm;
   io::write_file(path, out.dump(2) + "\n");
 }

@@ -11,7 +11,8 @@ namespace tribin {
 std::vector<Vector6> free_directions_about_center(const Part& part, const Pose& camera_from_part);
 
 /// Fills covariance, free and weak directions from the information of the final refinement.
-void describe_uncertainty(const Part& part, const NoiseProfile& noise, const Refinement& refinement,
+/// \param systematic_pull  from pull_of_systematic_errors, at the refined pose.
+void describe_uncertainty(const Part& part, const Matrix6& systematic_pull, const Refinement& refinement,
                           Instance& instance);
 
 /// Fills evidence: each primitive of the part that enough pixels show, measured without its nominal value.

@@ -9,6 +9,7 @@
 #include "likelihood.hpp"
 #include "tribin/core/error.hpp"
 #include "tribin/core/parallel.hpp"
+#include "tribin/pose/systematic_error.hpp"
 
 namespace tribin {
 namespace {
@@ -71,7 +72,10 @@ Instance make_instance(const Polished& p, std::span<const Part> parts, const Sce
   options.frozen = free_directions_about_center(part, p.candidate.camera_from_part);
   const Refinement refined = refine_guarded(part, scene, p.candidate.camera_from_part, options);
   out.camera_from_part = refined.camera_from_part;
-  describe_uncertainty(part, noise, refined, out);
+  const Vec3 center(out.camera_from_part * part.box_center());
+  const Matrix6 pull = pull_of_systematic_errors(part.render_mesh, scene, out.camera_from_part, noise, center, step,
+                                                 options.cad_sigma_mm);
+  describe_uncertainty(part, pull, refined, out);
   describe_evidence(part, scene, features, out);
 
   // Self-similar poses: those that keep 1 % are told.

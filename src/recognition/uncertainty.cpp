@@ -40,7 +40,7 @@ std::vector<Vector6> free_directions_about_center(const Part& part, const Pose& 
   return out;
 }
 
-void describe_uncertainty(const Part& part, const NoiseProfile& noise, const Refinement& refinement,
+void describe_uncertainty(const Part& part, const Matrix6& systematic_pull, const Refinement& refinement,
                           Instance& instance) {
   const double lever = part.gyration_mm;
   Vec6 scale;
@@ -56,12 +56,12 @@ void describe_uncertainty(const Part& part, const NoiseProfile& noise, const Ref
   h = keep * h * keep;
   const Eigen::SelfAdjointEigenSolver<Mat6> eigen(h);
   const std::size_t free_count = part.symmetry.continuous.size();
-  Mat6 covariance = Mat6::Zero();
+  Mat6 held = Mat6::Zero();  // the inverse of the information, where there is any
   for (int k = static_cast<int>(free_count); k < 6; ++k) {
     const double information = std::max(eigen.eigenvalues()(k) / inflation, 1 / (part.diameter_mm * part.diameter_mm));
     const Vec6 e = eigen.eigenvectors().col(k);
     const double sigma = 1 / std::sqrt(information);
-    covariance += e * e.transpose() * (sigma * sigma);
+    held += e * e.transpose() * (sigma * sigma);
     if (sigma > weak_limit_mm(part)) {
       WeakDirection weak;
       const Vec6 d = origin_from_center(part, instance.camera_from_part) * Vec6(scale.cwiseProduct(e));
@@ -73,11 +73,10 @@ void describe_uncertainty(const Part& part, const NoiseProfile& noise, const Ref
       instance.weak_directions.push_back(weak);
     }
   }
-  covariance = Mat6(scale.asDiagonal()) * covariance * Mat6(scale.asDiagonal());
-  // Systematic: a common scale error moves the part along its own ray, an offset along the optical axis.
-  const Eigen::Vector3d c = instance.camera_from_part * Eigen::Vector3d(part.box_center());
-  covariance.topLeftCorner<3, 3>() += noise.scale_error * noise.scale_error * c * c.transpose();
-  covariance(2, 2) += noise.offset_mm * noise.offset_mm;
+  // Systematic: the pose follows the sensor's smooth errors as far as the pixels that hold it do.
+  const Mat6 pull = Mat6(scale.asDiagonal()) * Mat6(systematic_pull) * Mat6(scale.asDiagonal());
+  Mat6 covariance = Mat6(scale.asDiagonal()) * (held + held * (keep * pull * keep) * held / (inflation * inflation)) *
+                    Mat6(scale.asDiagonal());
   const Mat6 to_origin = origin_from_center(part, instance.camera_from_part);
   covariance = to_origin * covariance * to_origin.transpose();
   instance.free_directions.clear();

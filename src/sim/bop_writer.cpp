@@ -170,6 +170,7 @@ void write_bop_scene(const fs::path& folder, const BopImage& image, int classes,
                          {"cam_R_w2c", row_wise(image.camera_from_world.linear())},
                          {"cam_t_w2c", row_wise(image.camera_from_world.translation())}};
   if (image.scale_error > 0) camera["scale_error"] = image.scale_error;
+  if (image.shape_error > 0) camera["shape_error"] = image.shape_error;
   write_json(folder / "scene_camera.json", {{"0", camera}});
   ordered_json all = ordered_json::array();
   for (int k = 1; k <= classes; ++k) all.push_back(k);

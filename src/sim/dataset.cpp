@@ -163,7 +163,7 @@ void make_scene(const DatasetOptions& options, const SceneStock& stock, int scen
   fs::remove_all(unfinished);
   write_bop_scene(unfinished,
                   {&simulated, drawn.camera_from_world, drawn.object_of_body, bounds_of(simulated, drawn),
-                   std::hypot(options.scale_error, kShapeRms * drawn.sensor.systematic)},
+                   options.scale_error, kShapeRms * drawn.sensor.systematic},
                   static_cast<int>(options.parts.size()), depth_scale_for(drawn.largest_depth_mm));
   if (options.frames) write_frames_of(drawn, seed, unfinished / "frames");
   io::write_file(unfinished / "scene_info.json", info.dump(1) + "\n");

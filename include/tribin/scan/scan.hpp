@@ -18,6 +18,7 @@ struct NoiseProfile {
   double correlation_px = -1;  ///< c above, in [0, 5]; < 0 = unknown, estimated from the scan
   double scale_error = 0;      ///< sd of the relative scale error, common to the whole scan (systematic)
   double offset_mm = 0;        ///< sd of a common depth offset (systematic)
+  double shape_error = 0;      ///< rms of a relative depth error that changes smoothly over the image (systematic)
 };
 
 /// Why a pixel has no measurement: values of Scan::invalid_reason. Decoders and simulators share them.

@@ -16,7 +16,8 @@ struct BopImage {
   Pose camera_from_world = Pose::Identity();
   std::vector<int> object_of_body;  ///< BOP obj_id (from 1) of each body; 0 = no part (table)
   std::vector<PoseBound> bounds;    ///< of each body, or empty
-  double scale_error = 0;           ///< sd of the relative depth error that the camera's maker would state
+  double scale_error = 0;  ///< sd of the relative depth error of the whole scene, as the camera's maker states it
+  double shape_error = 0;  ///< rms of the one that changes smoothly over the image
 };
 
 /// Starts a data set: models/ (PLY, models_info.json with diameter, box and symmetries; `near_symmetries_discrete` are
