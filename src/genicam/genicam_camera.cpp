@@ -40,8 +40,16 @@ class GenicamCamera : public Camera {
       throw Error(ErrorCode::bad_option, name_ +
                                              ": saw the trigger free_run with patterns, wanted hardware, software "
                                              "or software_burst: pictures and patterns must go together");
-    camera_.reset(call(name_, "no such camera, or it is in use", arv_camera_new,
-                       options.id.empty() ? nullptr : options.id.c_str()));
+    // A camera that is busy answers its first questions late, and Aravis gives up after half a second.
+    constexpr int kTries = 3;
+    for (int i = 1; !camera_; ++i) {
+      try {
+        camera_.reset(call(name_, "no such camera, or it is in use", arv_camera_new,
+                           options.id.empty() ? nullptr : options.id.c_str()));
+      } catch (const Error&) {
+        if (i == kTries) throw;
+      }
+    }
     if (options.id.empty())
       name_ += std::string(":") + call(name_, "its name", arv_camera_get_device_id, camera_.get());
     lost_signal_ = g_signal_connect(device(), "control-lost", G_CALLBACK(&GenicamCamera::on_lost), this);

@@ -198,8 +198,8 @@ bool keeps_limits(const Part& part, const PoseCandidate& candidate, double slack
   };
   // 40 supported pixels fix a pose no better than chance does; less is not a look at a part.
   if (fails("pixels", v.supported, 40, v.supported < 40)) return false;
-  // Less than a fifth of the part, measured, is not a look at it: any face of its size would do.
-  if (fails("measured_fraction", v.measured_fraction(), 0.2, v.measured_fraction() < 0.2)) return false;
+  if (fails("measured_fraction", v.measured_fraction(), kLeastMeasured, v.measured_fraction() < kLeastMeasured))
+    return false;
   if (fails("free_space", v.free_space(), kFreeSpace + slack, v.free_space() > kFreeSpace + slack)) return false;
   if (fails("support", v.support(), kSupport - slack, v.support() < kSupport - slack)) return false;
   if (fails("contour", v.contour(), kContour - slack, v.contour() < kContour - slack)) return false;

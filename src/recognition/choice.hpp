@@ -39,6 +39,10 @@ bool plausible(const Part& part, const PoseCandidate& settled, std::vector<Reaso
 /// \param settled  from settled_on_scan.
 Polished polish(const SceneDepth& scene, std::span<const Part> parts, const PoseCandidate& settled);
 
+/// Share of the silhouette that must be measured, on surfaces that are not too large for the part: less than a fifth is
+/// not a look at it, any face of its size would do.
+inline constexpr double kLeastMeasured = 0.2;
+
 /// Limits that an answer must keep. Value and limit go into `rejected` when one fails.
 bool acceptable(const Part& part, const PoseCandidate& candidate, std::vector<Reason>& rejected);
 

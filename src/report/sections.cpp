@@ -218,6 +218,7 @@ std::string sentence_of(const Reason& r) {
       {"pixels", "Too few pixels would hold it"},
       {"visible_fraction", "Too little of it would be visible"},
       {"measured_fraction", "Too little of it is measured"},
+      {"own_surface", "Most of what would hold it belongs to a wall, a floor or a rim"},
       {"self_similar", "It stands there, but its turn is not settled"},
       {"tolerance", "Its place is not sure enough for the tolerance asked for"},
       {"cylinder_radius", "A cylinder's radius is another one's"},
