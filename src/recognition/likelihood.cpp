@@ -66,7 +66,7 @@ Prediction prediction(const SceneDepth& scene, const IndexRender& r, double chor
 double common_error_mm(const std::vector<double>& means, const std::vector<double>& variances) {
   if (means.size() < 8) return 0;
   std::vector<double> sizes(means.size());
-  for (std::size_t i = 0; i < means.size(); ++i) sizes[i] = means[i] * means[i] - variances[i];
+  for (std::size_t i = 0; i < means.size(); ++i) sizes[i] = means[i] * means[i] - 0.455 * variances[i];
   // The median of a squared normal variable is 0.455 of its mean.
   std::nth_element(sizes.begin(), sizes.begin() + static_cast<long>(sizes.size() / 2), sizes.end());
   return std::sqrt(std::max(0.0, sizes[sizes.size() / 2] / 0.455));

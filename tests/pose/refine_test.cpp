@@ -36,7 +36,9 @@ TEST(RenderIndex, SeesTheDepthOfAPlaneFace) {
   render_index(make_render_mesh(mesh), camera, pose, 1, render);
   EXPECT_EQ(render.silhouette_pixels, 400u);  // 20 mm at 500 mm and 500 px: 20 x 20 pixels
   for (std::size_t i = 0; i < render.triangle.size(); ++i)
-    if (render.triangle[i] >= 0) EXPECT_NEAR(1 / render.inverse_z[i], 500, 1e-3);
+    if (render.triangle[i] >= 0) {
+      EXPECT_NEAR(1 / render.inverse_z[i], 500, 1e-3);
+    }
 }
 
 /// 1/z of the first facet that a ray of the camera meets; 0 = none.
