@@ -5,15 +5,15 @@
 
 namespace tribin {
 
-/// What errors that are common to many pixels do to a refined pose: the covariance of the pull on it, B S B^T, whose
-/// sandwich with the inverse information, H^-1 (B S B^T) H^-1, is the covariance of the pose.
+/// What errors of the sensor that are common to many pixels do to a refined pose: the covariance of the pull on it,
+/// B S B^T, whose sandwich with the inverse information, H^-1 (B S B^T) H^-1, is the covariance of the pose.
 ///
 /// The relative error of depth is taken as a quadratic over the image (coordinates in [-1, 1]), of rms
 /// `noise.shape_error`, plus a scale of sd `noise.scale_error` and an offset of sd `noise.offset_mm` for the whole
-/// scan; beside these, what the residuals of whole patches of the part show that noise does not make.
+/// scan.
 ///
 /// \param center  in the camera frame; rotations turn about it, as in Refinement::information.
-/// \return of the conjugates of (mm, rad about the centre), camera axes.
+/// \return of the conjugates of (mm, rad about the centre), camera axes; 0 where the profile names no such error.
 /// \cost one render and about 20 ns a pixel.
 /// \source ours: J_s S_sys J_s^T of the design notes, section 9, with the sensor's smooth errors as parameters.
 Matrix6 pull_of_systematic_errors(const RenderMesh& mesh, const SceneDepth& scene, const Pose& camera_from_part,
