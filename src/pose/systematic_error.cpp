@@ -3,6 +3,8 @@
 #include <array>
 #include <cmath>
 
+#include "inside_silhouette.hpp"
+
 namespace tribin {
 namespace {
 
@@ -37,7 +39,8 @@ Matrix6 pull_of_systematic_errors(const RenderMesh& mesh, const SceneDepth& scen
       if (k < 0) continue;
       const int u = render.u0 + i * render.step, v = render.v0 + j * render.step;
       const float z = scene.z_mm(u, v);
-      if (!(z > 0) || scene.near_break(u, v)) continue;
+      // The pixels of the information, no others: one more face would pull where nothing else holds.
+      if (!(z > 0) || scene.near_break(u, v) || !inside_silhouette(render, i, j)) continue;
       const Eigen::Vector3d ray = camera.ray(u, v);
       const Eigen::Vector3d n = render.normal[static_cast<std::size_t>(k)].cast<double>();
       const double along = n.dot(ray);
