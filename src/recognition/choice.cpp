@@ -132,20 +132,6 @@ void add_weakest_moves(const Part& part, const PoseCandidate& from, std::vector<
 
 }  // namespace
 
-int CellMask::shared(const CellMask& other) const {
-  int n = 0;
-  for (std::size_t i = 0; i < std::min(bits.size(), other.bits.size()); ++i)
-    n += std::popcount(bits[i] & other.bits[i]);
-  return n;
-}
-
-void CellMask::join(const CellMask& other) {
-  if (bits.size() < other.bits.size()) bits.resize(other.bits.size(), 0);
-  for (std::size_t i = 0; i < other.bits.size(); ++i) bits[i] |= other.bits[i];
-  count = 0;
-  for (const std::uint64_t b : bits) count += std::popcount(b);
-}
-
 CellMask mask_of(const Part& part, const SceneDepth& scene, const PoseCandidate& candidate) {
   CellMask mask;
   const Image<Vec3f>& cells = scene.cell_normal;

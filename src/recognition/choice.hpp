@@ -3,18 +3,10 @@
 #include <span>
 
 #include "candidates.hpp"
+#include "cell_mask.hpp"
 #include "tribin/recognition/instance.hpp"
 
 namespace tribin {
-
-/// Which cells of the scan a pose explains, for conflicts between candidates.
-struct CellMask {
-  std::vector<std::uint64_t> bits;
-  int count = 0;
-
-  int shared(const CellMask& other) const;
-  void join(const CellMask& other);
-};
 
 /// A candidate brought to its best: its self-similar poses and spins tried, refined on more pixels.
 struct Polished {

@@ -27,15 +27,12 @@ SceneFeatures make_scene_features(const Primitives& primitives, const PrimitiveM
   return out;
 }
 
-void claim_cells(SceneFeatures& scene, const std::vector<std::uint64_t>& bits) {
-  const Image<std::int32_t>& grid = scene.surfels->surfel_of_cell;
-  if (scene.claimed.empty()) scene.claimed = Image<std::uint8_t>(grid.width, grid.height, 0);
-  for (std::size_t i = 0; i < grid.size(); ++i)
-    if (bits[i / 64] >> (i % 64) & 1) scene.claimed.data[i] = 1;
+void claim_cells(SceneFeatures& scene, const CellMask& mask) {
+  scene.claimed.join(mask);
   // A feature of which more than half is explained starts nothing new.
   std::erase_if(scene.features, [&](const SceneFeature& f) {
     std::size_t inside = 0;
-    for (const std::uint32_t s : f.primitive->surfels) inside += scene.claimed.data[scene.surfels->cell[s]];
+    for (const std::uint32_t s : f.primitive->surfels) inside += scene.claimed.holds(scene.surfels->cell[s]);
     return 2 * inside > f.primitive->surfels.size();
   });
 }

@@ -2,6 +2,7 @@
 
 #include <vector>
 
+#include "cell_mask.hpp"
 #include "tribin/model/primitive_model.hpp"
 #include "tribin/part/part.hpp"
 #include "tribin/pose/scene_depth.hpp"
@@ -23,11 +24,11 @@ struct SceneFeatures {
   std::vector<SceneFeature> features;  ///< one a primitive of the observation, same order
   const Surfels* surfels = nullptr;
   const Primitives* primitives = nullptr;
-  Image<std::uint8_t> claimed;  ///< cells that an accepted instance explains; empty = none
+  CellMask claimed;  ///< cells that an accepted instance explains
 };
 
 /// Marks cells as explained and drops the features that lie in them.
-void claim_cells(SceneFeatures& scene, const std::vector<std::uint64_t>& bits);
+void claim_cells(SceneFeatures& scene, const CellMask& mask);
 
 SceneFeatures make_scene_features(const Primitives& primitives, const PrimitiveModel& observation,
                                   const Surfels& surfels);

@@ -57,6 +57,13 @@ std::pair<double, double> predicted_errors(const Part& part, const Instance& ins
   return {std::sqrt((j * c * j.transpose()).trace()), std::sqrt(c.bottomRightCorner<3, 3>().trace())};
 }
 
+/// What the alternatives leave to the pose that is told.
+double share_of_first(const Instance& instance) {
+  double share = 1;
+  for (const Alternative& a : instance.alternatives) share -= a.probability;
+  return share;
+}
+
 Instance make_instance(const Polished& p, std::span<const Part> parts, const SceneDepth& scene,
                        const SceneFeatures& features, const NoiseProfile& noise,
                        const RecognitionOptions& recognition) {
@@ -94,13 +101,11 @@ Instance make_instance(const Polished& p, std::span<const Part> parts, const Sce
     out.equivalent_poses.push_back(out.camera_from_part * part.symmetry.discrete[i]);
   const Verification& v = p.candidate.verification;
   out.visible_fraction = v.visible_fraction();
-  double main = 1;
-  for (const Alternative& a : out.alternatives) main -= a.probability;
   const auto [place, turn] = predicted_errors(part, out);
-  main /= 1 + p.class_odds;
   // "Found" is 5 % of the diameter at the rim, half a diameter from the centre.
   out.score = probability(v) *
-              probability_below(0.05 * part.diameter_mm, std::hypot(place, turn * 0.5 * part.diameter_mm)) * main;
+              probability_below(0.05 * part.diameter_mm, std::hypot(place, turn * 0.5 * part.diameter_mm)) *
+              (share_of_first(out) / (1 + p.class_odds));
   if (recognition.tolerance_mm > 0 || recognition.tolerance_rad > 0) {
     double within = out.score;
     if (recognition.tolerance_mm > 0) within *= probability_below(recognition.tolerance_mm, place);
@@ -157,15 +162,15 @@ struct Standing {
 double own_share(const CellMask& mask, const Image<std::uint8_t>& background) {
   if (mask.count == 0) return 0;
   int own = 0;
-  for (std::size_t i = 0; i < background.size(); ++i) own += (mask.bits[i / 64] >> (i % 64) & 1) && !background.data[i];
+  for (std::size_t i = 0; i < background.size(); ++i) own += mask.holds(i) && !background.data[i];
   return double(own) / mask.count;
 }
 
 /// Best first: each place of the scan goes to the pose, of any part, that explains it best.
-/// \param claimed  cells that answers explain, of earlier rounds too; grows, and so does `stands`.
+/// \param stands  what earlier rounds found; grows.
 std::vector<Polished> choose(const SceneFeatures& features, const SceneDepth& scene, std::span<const Part> parts,
-                             std::vector<PoseCandidate> candidates, CellMask& claimed, Standing& stands,
-                             Refused& refused, std::vector<Reason>& rejected) {
+                             std::vector<PoseCandidate> candidates, Standing& stands, Refused& refused,
+                             std::vector<Reason>& rejected) {
   std::erase_if(candidates, [&](const PoseCandidate& c) { return refused.holds(parts, c); });
   std::stable_sort(candidates.begin(), candidates.end(), [](const PoseCandidate& a, const PoseCandidate& b) {
     return a.verification.gain > b.verification.gain;
@@ -175,6 +180,7 @@ std::vector<Polished> choose(const SceneFeatures& features, const SceneDepth& sc
     const auto k = static_cast<std::size_t>(i);
     masks[k] = mask_of(parts[static_cast<std::size_t>(candidates[k].part)], scene, candidates[k]);
   });
+  CellMask claimed = features.claimed;  // and by this round's winners
   std::vector<Polished> winners;
   std::vector<bool> done(candidates.size(), false);
   for (std::size_t i = 0; i < candidates.size(); ++i) {
@@ -270,7 +276,6 @@ Instances recognize(const Primitives& primitives, const PrimitiveModel& observat
            std::chrono::steady_clock::now() - start > std::chrono::milliseconds(options.time_limit_ms);
   };
   Refused refused;
-  CellMask claimed;
   Standing stands;
   // Rounds on what is left: primitives first, as long as they lead to parts; then pairs of points.
   for (const Source source : {Source::primitives, Source::point_pairs}) {
@@ -284,17 +289,15 @@ Instances recognize(const Primitives& primitives, const PrimitiveModel& observat
         candidates.insert(candidates.end(), found.begin(), found.end());
       }
       const std::vector<Polished> winners =
-          choose(features, scene, parts, std::move(candidates), claimed, stands, refused, out.rejected);
+          choose(features, scene, parts, std::move(candidates), stands, refused, out.rejected);
       for (const Polished& w : winners) {
         Instance instance = make_instance(w, parts, scene, features, surfels.scan->noise, options);
-        claim_cells(features, w.mask.bits);
-        double main = 1;
-        for (const Alternative& a : instance.alternatives) main -= a.probability;
+        claim_cells(features, w.mask);
         const auto kept_back = [&](const char* test, double value, double limit) {
           add_reason(out.rejected, {instance.part, "acceptance", test, value, limit, 1,
                                     place_of(parts[static_cast<std::size_t>(w.candidate.part)], w.candidate)});
         };
-        if (const double sure = instance.score / main; sure < kGivenOut) {
+        if (const double sure = instance.score / share_of_first(instance); sure < kGivenOut) {
           kept_back("probability", sure, kGivenOut);
         } else if (instance.score < kGivenOut) {
           kept_back("self_similar", instance.score, kGivenOut);

@@ -38,7 +38,7 @@ Image<std::uint8_t> background_cells(const SceneFeatures& scene, const Part& par
   const double loudest = 0.015 * part.diameter_mm;
   for (std::size_t i = 0; i < grid.size(); ++i)
     if (grid.data[i] >= 0)
-      out.data[i] = local_sigma(*scene.surfels, i) > loudest || (!scene.claimed.empty() && scene.claimed.data[i]) ||
+      out.data[i] = local_sigma(*scene.surfels, i) > loudest || scene.claimed.holds(i) ||
                     background[static_cast<std::size_t>(
                         scene.primitives->label_of_surfel[static_cast<std::size_t>(grid.data[i])])];
   return out;
