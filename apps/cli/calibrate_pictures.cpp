@@ -48,6 +48,8 @@ std::vector<fs::path> pictures_in(const fs::path& path) {
   return out;
 }
 
+#ifdef TRIBIN_WITH_CALIBRATION
+
 /// The last number in a file's name: left12.jpg and right12.jpg show one view.
 std::string number_in(const fs::path& file) {
   const std::string stem = file.stem().string();
@@ -69,8 +71,6 @@ std::string (*key_for(const std::vector<Source>& sources))(const fs::path&) {
   const bool all_lone = std::all_of(count.begin(), count.end(), [](const auto& c) { return c.second == 1; });
   return all_lone ? +[](const fs::path& file) { return number_in(file); } : by_stem;
 }
-
-#ifdef TRIBIN_WITH_CALIBRATION
 
 /// Finds the board in all pictures. \throws Error where pictures of one camera differ in size, or none shows the board.
 RigCalibrationReport look(const Board& board, const std::vector<Source>& sources) {

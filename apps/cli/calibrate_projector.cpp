@@ -21,6 +21,8 @@ struct Options : CalibrationArguments {
   std::string list, projector_size, rig;
 };
 
+#ifdef TRIBIN_WITH_CALIBRATION
+
 /// A folder of frames, or all folders of frames in it, by name.
 std::vector<fs::path> stops_in(const fs::path& path, bool described_outside) {
   if (!fs::is_directory(path))
@@ -35,8 +37,6 @@ std::vector<fs::path> stops_in(const fs::path& path, bool described_outside) {
   if (out.empty()) out.push_back(path);
   return out;
 }
-
-#ifdef TRIBIN_WITH_CALIBRATION
 
 /// What the camera sees under full light: the white image of the set, else the mean of the fringes.
 Image<std::uint8_t> lit_picture(const FrameStack& frames, const Decoded& decoded) {
