@@ -69,6 +69,22 @@ Fields<RackSlots> slot_fields() {
   });
 }
 
+Fields<GivenSlot> given_slot_fields() {
+  Fields<GivenSlot> fields;
+  add_pose(fields, "rack_from_slot", &GivenSlot::rack_from_slot, "where it is, z up");
+  return fields.texts("parts", &GivenSlot::parts,
+                      "names of the parts that may stand in it; none: as the sequence says");
+}
+
+std::vector<Pose> read_way_points(const TomlPlace& place) {
+  constexpr const char* kWanted = "a list of at most 6 poses";  // as many as the hand-shake takes at once
+  const std::size_t count = place.array_size(kWanted);
+  if (count > 6) place.fail(kWanted);
+  std::vector<Pose> out;
+  for (std::size_t i = 0; i < count; ++i) out.push_back(read_pose(place.at(i)));
+  return out;
+}
+
 Fields<CellController> controller_fields() {
   Fields<CellController> fields;
   fields.choice("kind",
@@ -122,6 +138,7 @@ Fields<Gripper> gripper_fields() {
   add_pose(fields, "flange_from_tcp", &Gripper::flange_from_tcp, "the tool's centre point");
   fields.list("boxes", box_fields(), &Gripper::boxes, "its body");
   fields.list("cylinders", cylinder_fields(), &Gripper::cylinders, "its body");
+  fields.number("slip_mm", "mm", {0, 100}, &Gripper::slip_mm, "sd of how a part shifts while it is gripped");
   return fields.check([](const TomlPlace& place, const Gripper& gripper) {
     must_have_name(place, gripper.name);
     const bool jaws = gripper.kind != GripperKind::suction && gripper.kind != GripperKind::magnet;
@@ -147,21 +164,36 @@ Fields<CellPart> part_fields() {
   fields.number("max_tilt_deg", "deg", {0, 180}, &CellPart::max_tilt_rad, "of the approach to the vertical", kDegree);
   fields.list("pick_points", pick_point_fields(), &CellPart::pick_points,
               "where to grip; none: grasps are found from its surfaces");
+  add_pose(fields, "slot_from_part", &CellPart::slot_from_part, "how it stands in a slot");
   return fields.check([](const TomlPlace& place, const CellPart& part) { must_have_name(place, part.name); });
+}
+
+Fields<Regrasp> regrasp_fields() {
+  Fields<Regrasp> fields;
+  add_pose(fields, "base_from_station", &Regrasp::base_from_station,
+           "where it holds a part, as a slot does; z up, and room around it");
+  return fields;
 }
 
 Fields<Rack> rack_fields() {
   Fields<Rack> fields;
   add_pose(fields, "base_from_rack", &Rack::base_from_rack, "the first slot, z up");
   fields.table("slots", slot_fields(), &Rack::slots, "the grid of slots");
+  fields.list("slot", given_slot_fields(), &Rack::given, "`[[rack.slot]]`, each slot by itself, in place of the grid");
   fields.texts("sequence", &Rack::sequence, "names of parts, placed in turn; none: any part");
+  fields.choice("when_missing", {{"skip", WhenMissing::skip}, {"wait", WhenMissing::wait}}, &Rack::when_missing,
+                "the next slot's part is not seen: fill a later slot, or wait for it");
   return fields.number("chamfer_mm", "mm", {0, 1000}, &Rack::chamfer_mm, "of a slot: what a place error may be");
 }
 
 Fields<CellRobot> robot_fields() {
   Fields<CellRobot> fields;
   fields.file("model", &CellRobot::model, "geometry file of the arm").required();
+  fields.text("arm", &CellRobot::arm, "of a model of several; left out: its first");
   fields.table("controller", controller_fields(), &CellRobot::controller, "how it is reached");
+  fields.number("sigma_mm", "mm", {0, 100}, &CellRobot::sigma_mm, "sd of where it stands when it is sent somewhere");
+  fields.value("way_points", "", "at most 6 poses", "[]", &CellRobot::way_points,
+               "of the TCP in the base, from the bin to the rack; none: up, across and down", read_way_points);
   return fields.number("speed_cap_mm_s", "mm/s", {kAboveZero, 2000}, &CellRobot::speed_cap_mm_s,
                        "no command asks for more");
 }

@@ -11,6 +11,7 @@ io::Fields<CellBin> bin_fields();
 io::Fields<Gripper> gripper_fields();
 io::Fields<CellPart> part_fields();
 io::Fields<Rack> rack_fields();
+io::Fields<Regrasp> regrasp_fields();
 io::Fields<CellRobot> robot_fields();
 io::Fields<Safety> safety_fields();
 

@@ -20,6 +20,7 @@ struct Sections {
   std::vector<Gripper> grippers;
   std::vector<CellPart> parts;
   std::optional<Rack> rack;
+  std::optional<Regrasp> regrasp;
   std::vector<CellRobot> robots;
   Safety safety;
 };
@@ -60,12 +61,16 @@ void check_names(const TomlPlace& top, const Sections& s) {
 std::vector<std::string> warnings_of(const Sections& s) {
   std::vector<std::string> out;
   if (!s.rack) return out;
-  for (std::size_t k = 0; k < s.rack->sequence.size(); ++k) {
-    const std::string& name = s.rack->sequence[k];
-    const auto has_name = [&](const CellPart& part) { return part.name == name; };
-    if (std::none_of(s.parts.begin(), s.parts.end(), has_name))
-      out.push_back("rack.sequence[" + std::to_string(k) + "]: there is no part " + io::in_quotes(name));
-  }
+  const auto note = [&](const std::string& place, const std::vector<std::string>& names) {
+    for (std::size_t k = 0; k < names.size(); ++k) {
+      const auto has_name = [&](const CellPart& part) { return part.name == names[k]; };
+      if (std::none_of(s.parts.begin(), s.parts.end(), has_name))
+        out.push_back(place + "[" + std::to_string(k) + "]: there is no part " + io::in_quotes(names[k]));
+    }
+  };
+  note("rack.sequence", s.rack->sequence);
+  for (std::size_t i = 0; i < s.rack->given.size(); ++i)
+    note("rack.slot[" + std::to_string(i) + "].parts", s.rack->given[i].parts);
   return out;
 }
 
@@ -88,6 +93,7 @@ Fields<Sections> sections() {
   fields.list("gripper", config::gripper_fields(), &Sections::grippers, "`[[gripper]]`, one a tool");
   fields.list("part", config::part_fields(), &Sections::parts, "`[[part]]`, one a CAD file");
   fields.table("rack", config::rack_fields(), &Sections::rack, "where parts are put");
+  fields.table("regrasp", config::regrasp_fields(), &Sections::regrasp, "where parts are gripped anew");
   fields.list("robot", config::robot_fields(), &Sections::robots, "`[[robot]]`, one an arm");
   fields.table("safety", config::safety_fields(), &Sections::safety, "what motion is refused for");
   return fields.check(check_names).check(check_hand_eye);
@@ -108,6 +114,7 @@ WorkCell read_cell(const std::filesystem::path& path, const char* wanted) {
           std::move(s.grippers),
           std::move(s.parts),
           std::move(s.rack),
+          std::move(s.regrasp),
           std::move(s.robots),
           std::move(s.safety),
           std::move(warnings)};

@@ -57,6 +57,7 @@ struct Gripper {
   Pose flange_from_tcp = Pose::Identity();
   std::vector<CellBox> boxes;           ///< its body, frame of the flange
   std::vector<CellCylinder> cylinders;  ///< the same
+  double slip_mm = 0.3;                 ///< sd of how a part shifts while it is gripped
 };
 
 /// A place where a part is to be gripped, given by hand.
@@ -73,8 +74,9 @@ struct CellPart {
   std::string unit = "mm";  ///< of CAD files that name none: mm, cm, m, inch
   double mass_kg = 0;       ///< 0 = not known
   std::vector<std::string> grippers;
-  double max_tilt_rad = 40 * kDegree;  ///< of the approach to the vertical
-  std::vector<PickPoint> pick_points;  ///< empty = grasps are found from the part's surfaces
+  double max_tilt_rad = 40 * kDegree;      ///< of the approach to the vertical
+  std::vector<PickPoint> pick_points;      ///< empty = grasps are found from the part's surfaces
+  Pose slot_from_part = Pose::Identity();  ///< how it stands in a slot
 };
 
 struct RackSlots {
@@ -83,11 +85,27 @@ struct RackSlots {
   double stagger_mm = 0;         ///< shift along x of every second row
 };
 
+/// A slot that is given by itself, outside of any grid.
+struct GivenSlot {
+  Pose rack_from_slot = Pose::Identity();
+  std::vector<std::string> parts;  ///< that may stand in it; empty = as the sequence says
+};
+
+/// What to do while the part of the next slot is not seen.
+enum class WhenMissing { skip, wait };
+
 struct Rack {
   Pose base_from_rack = Pose::Identity();  ///< the first slot; z up
   RackSlots slots;
+  std::vector<GivenSlot> given;       ///< in place of the grid, in the order of filling
   std::vector<std::string> sequence;  ///< names of parts, used in turn
   double chamfer_mm = 0;              ///< of a slot: what a place error may be
+  WhenMissing when_missing = WhenMissing::skip;
+};
+
+/// Where a part is put down to be gripped anew: a fixture that holds it as a slot does, with room around it.
+struct Regrasp {
+  Pose base_from_station = Pose::Identity();  ///< z up
 };
 
 enum class ControllerKind { nx100, hses, text };
@@ -100,8 +118,11 @@ struct CellController {
 
 struct CellRobot {
   std::filesystem::path model;  ///< geometry file of the arm
+  std::string arm;              ///< of the model; empty = its first
   CellController controller;
   double speed_cap_mm_s = 250;
+  double sigma_mm = 0.3;         ///< sd of where it stands when it is sent somewhere
+  std::vector<Pose> way_points;  ///< base_from_tcp from bin to rack; empty = up, across, down
 };
 
 /// A box along the base's axes.
@@ -125,6 +146,7 @@ struct WorkCell {
   std::vector<Gripper> grippers;
   std::vector<CellPart> parts;
   std::optional<Rack> rack;
+  std::optional<Regrasp> regrasp;
   std::vector<CellRobot> robots;
   Safety safety;
   std::vector<std::string> warnings;
