@@ -51,7 +51,10 @@ Fields<PickPoint> pick_point_fields() {
   fields.text("name", &PickPoint::name, "for messages");
   fields.text("gripper", &PickPoint::gripper, "name of a gripper; left out: any of the part's");
   add_pose(fields, "part_from_tcp", &PickPoint::part_from_tcp, "where the TCP is when it grips");
-  return fields.number("priority", "", {kAboveZero, 1000}, &PickPoint::priority, "weight of its score");
+  fields.number("priority", "", {kAboveZero, 1000}, &PickPoint::priority, "weight of its score");
+  fields.number("tilt_deg", "deg", {0, 90}, &PickPoint::tilt_rad, "by which the tool may tilt from it", kDegree);
+  return fields.number("roll_deg", "deg", {0, 180}, &PickPoint::roll_rad,
+                       "by which it may turn about its own axis, to both sides; 180: as it likes", kDegree);
 }
 
 Fields<RackSlots> slot_fields() {
@@ -99,8 +102,10 @@ Fields<CellController> controller_fields() {
 Fields<CellCamera> camera_fields() {
   Fields<CellCamera> fields;
   fields.file("file", &CellCamera::file, "camera file: intrinsics and noise").required();
-  return fields.choice("mount", {{"fixed", CameraMount::fixed}, {"hand", CameraMount::hand}}, &CellCamera::mount,
-                       "fixed: it stands in the cell; hand: it is on the flange");
+  fields.choice("mount", {{"fixed", CameraMount::fixed}, {"hand", CameraMount::hand}}, &CellCamera::mount,
+                "fixed: it stands in the cell; hand: it is on the flange");
+  return fields.number("keep_out_mm", "mm", {0, kLargest}, &CellCamera::keep_out_mm,
+                       "radius of a ball about its optical centre that its body fills; 0 = not said");
 }
 
 Fields<HandEyeKeys> hand_eye_fields() {
@@ -133,7 +138,11 @@ Fields<Gripper> gripper_fields() {
               &Gripper::kind, "how it holds")
       .required();
   fields.numbers("stroke_mm", "mm", {0, kLargest}, &Gripper::stroke_mm, "least and largest opening; jaws need it");
-  fields.number("force_n", "N", {0, 1e6}, &Gripper::force_n, "of closing or holding");
+  fields.number("force_n", "N", {0, 1e6}, &Gripper::force_n, "of closing or holding; 0 = not said");
+  fields.number("friction", "", {0.01, 2}, &Gripper::friction, "of the jaws on the parts");
+  fields.numbers("finger_mm", "mm", {0, kLargest}, &Gripper::finger_mm,
+                 "each jaw: thickness (along its travel), width, length; left out: see below");
+  fields.number("tip_mm", "mm", {0, kLargest}, &Gripper::tip_mm, "how far such jaws reach beyond the TCP");
   fields.number("cup_radius_mm", "mm", {0, kLargest}, &Gripper::cup_radius_mm, "suction and magnets; 0 = not said");
   add_pose(fields, "flange_from_tcp", &Gripper::flange_from_tcp, "the tool's centre point");
   fields.list("boxes", box_fields(), &Gripper::boxes, "its body");
@@ -145,6 +154,11 @@ Fields<Gripper> gripper_fields() {
     if (place.has("stroke_mm") && !(gripper.stroke_mm[0] <= gripper.stroke_mm[1]))
       place.at("stroke_mm").fail("the least opening first");
     if (jaws && !(gripper.stroke_mm[0] < gripper.stroke_mm[1])) place.fail("a stroke_mm above 0, as jaws have");
+    if (place.has("finger_mm") && !jaws) place.at("finger_mm").fail("no finger_mm, as it has no jaws");
+    if (place.has("finger_mm") && !(gripper.finger_mm.array() > 0).all())
+      place.at("finger_mm").fail("3 lengths above 0: thickness, width, length");
+    if (place.has("tip_mm") && !(gripper.tip_mm < gripper.finger_mm.z()))
+      place.at("tip_mm").fail("less than the length in finger_mm");
   });
 }
 

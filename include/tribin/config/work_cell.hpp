@@ -18,6 +18,7 @@ namespace tribin {
 struct CellCamera {
   std::filesystem::path file;  ///< camera file (intrinsics, noise)
   CameraMount mount = CameraMount::fixed;
+  double keep_out_mm = 0;  ///< radius of a ball about its optical centre that its body fills; 0 = not said
 };
 
 /// Where the camera stands: on the base (fixed) or on the flange (hand).
@@ -52,8 +53,11 @@ struct Gripper {
   std::string name;
   GripperKind kind = GripperKind::parallel_outside;
   std::array<double, 2> stroke_mm{0, 0};  ///< least and largest opening; 0, 0 for suction and magnets
-  double force_n = 0;                     ///< of closing, or of holding
-  double cup_radius_mm = 0;               ///< suction and magnets
+  double force_n = 0;                     ///< of closing, or of holding; 0 = not said
+  double friction = 0.3;                  ///< of the jaws on the parts: metal on metal 0.2 to 0.3, rubber 0.5
+  Vec3 finger_mm = Vec3::Zero();  ///< of each jaw: thickness (along its travel), width, length; 0 = as the boxes say
+  double tip_mm = 0;              ///< how far such jaws reach beyond the TCP
+  double cup_radius_mm = 0;       ///< suction and magnets
   Pose flange_from_tcp = Pose::Identity();
   std::vector<CellBox> boxes;           ///< its body, frame of the flange
   std::vector<CellCylinder> cylinders;  ///< the same
@@ -66,6 +70,8 @@ struct PickPoint {
   std::string gripper;  ///< empty = any of the part's
   Pose part_from_tcp = Pose::Identity();
   double priority = 1;  ///< weight of its score, > 0
+  double tilt_rad = 0;  ///< the tool may tilt by that much from it
+  double roll_rad = 0;  ///< and turn about its own axis, to both sides; half a turn = as it likes
 };
 
 struct CellPart {
