@@ -4,18 +4,10 @@
 #include <vector>
 
 #include "arm_path.hpp"
-#include "tribin/grasp/grasp.hpp"
+#include "scene_facts.hpp"
 
 // One candidate in a scene: its path, and the checks in their order.
 namespace tribin::grasp {
-
-/// What is the same for all candidates.
-struct SceneFacts {
-  const Scene* scene = nullptr;
-  const PlanOptions* options = nullptr;
-  std::vector<Convex> bin;
-};
-SceneFacts make_facts(const Scene& scene, const PlanOptions& options);
 
 struct Refusal {
   Why why;
@@ -27,23 +19,36 @@ struct Attempt {
   int part = 0;  ///< index into Scene::parts
   const Candidate* candidate = nullptr;
   const GripperShape* gripper = nullptr;
+  const DepthSpace* around = nullptr;  ///< what was seen without the part itself; none where there is no scan
   Pose base_from_tcp = Pose::Identity();
   double tilt = 0, max_tilt = 0;  ///< [rad]
   double opening_before_mm = 0;
   double sigma_mm = 0, room_mm = 0;  ///< along the closing direction; what the jaws leave a side
-  double hold = 1;                   ///< force against what is needed
+  double hold = 1e300;               ///< force against weight
   double clearance_mm = 0;
   std::vector<PathPoint> path;
+  std::vector<std::vector<Convex>> moves;  ///< the open tool, swept along each piece of the path
   std::optional<ArmPath> arm_path;
+
+  std::size_t pick() const { return path.size() - 2; }
 };
 
-/// The checks in their order. \return the first that it fails; none: it is a grasp
-std::optional<Refusal> judge(const SceneFacts& facts, Attempt& attempt);
+using Checked = std::optional<Refusal>;
+
+/// What needs the candidate's place alone: cheap. \return the first check that it fails
+Checked judge_place(const SceneFacts& facts, Attempt& attempt);
+/// The path, the workspace, and the open tool against the bin.
+Checked judge_walls(const SceneFacts& facts, Attempt& attempt);
+/// Reach, and all that the tool, the part in hand and the arm could touch.
+Checked judge_way(const SceneFacts& facts, Attempt& attempt);
+
+/// Straight in along the tool and straight up, from above the bin and back there.
+void make_path(const SceneFacts& facts, Attempt& attempt);
+
+/// The arm along its path against bin, obstacles and what was seen.
+Checked check_arm(const SceneFacts& facts, Attempt& attempt);
 
 /// The grasp of an attempt that passed, with its terms and score.
 Grasp scored(const SceneFacts& facts, const Attempt& attempt);
-
-/// The sd of a point of a part along a unit direction, of its pose and of the hand-eye calibration [mm].
-double sigma_along(const Scene& scene, const PartHere& part, const Vec3& base_point, const Vec3& direction);
 
 }  // namespace tribin::grasp

@@ -1,9 +1,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 
 #include "judge.hpp"
-#include "tribin/core/error.hpp"
 #include "tribin/core/parallel.hpp"
 
 namespace tribin::grasp {
@@ -14,22 +14,6 @@ constexpr std::array<std::string_view, kWhys> kWhyNames = {
     "workspace",  "reach",     "form",    "bin",          "scan",           "part",   "obstacle",
     "held_bin",   "held_part", "arm_bin", "arm_scan",     "arm_obstacle",   "place"};
 
-void validate(const PlanOptions& o) {
-  const auto must = [](bool good, const char* name, double seen, const char* wanted) {
-    if (!good)
-      throw Error(ErrorCode::bad_option,
-                  std::string(name) + ": saw " + std::to_string(seen) + ", wanted a number in " + wanted);
-  };
-  must(!o.max_tilt_rad || (*o.max_tilt_rad >= 0 && *o.max_tilt_rad <= kPi), "max_tilt_rad", o.max_tilt_rad.value_or(0),
-       "[0, pi]");
-  must(o.approach_mm > 0 && o.approach_mm <= 1000, "approach_mm", o.approach_mm, "(0, 1000]");
-  must(o.retreat_mm > 0 && o.retreat_mm <= 1000, "retreat_mm", o.retreat_mm, "(0, 1000]");
-  must(o.clearance_mm >= 0 && o.clearance_mm <= 100, "clearance_mm", o.clearance_mm, "[0, 100]");
-  must(o.min_score >= 0 && o.min_score <= 1, "min_score", o.min_score, "[0, 1]");
-  must(o.looks > 0, "looks", o.looks, "1 and more");
-  must(o.most_per_part > 0, "most_per_part", o.most_per_part, "1 and more");
-}
-
 /// What became of one part's candidates.
 struct PartPlan {
   std::vector<Grasp> grasps;
@@ -37,56 +21,146 @@ struct PartPlan {
   int not_looked_at = 0;
 };
 
+/// The candidates of one part and gripper in a scene.
+class GripperPlan {
+ public:
+  GripperPlan(const SceneFacts& facts, int part, int gripper, const DepthSpace* around, PartPlan& out)
+      : facts_(facts),
+        here_(facts.scene->parts[part]),
+        part_(part),
+        gripper_(here_.part->grippers[gripper]),
+        around_(around),
+        out_(out) {
+    for (const Candidate& candidate : here_.part->candidates)
+      if (candidate.gripper == gripper) candidates_.push_back(&candidate);
+  }
+
+  void run() {
+    int looked = 0, found = 0;
+    for (const Attempt& fits : in_order()) {
+      if (looked >= facts_.options->looks || found >= facts_.options->most_per_part) {
+        ++out_.not_looked_at;
+        continue;
+      }
+      ++looked;
+      found += look_closely(fits);
+    }
+  }
+
+ private:
+  void refuse(const Attempt& a, const Refusal& refusal) {
+    out_.refused.push_back({part_, gripper_.gripper.name, a.candidate->family, refusal.why, refusal.value,
+                            refusal.limit, a.base_from_tcp});
+  }
+
+  /// Those whose place is good, the most promising first. Neighbours fail for the same reason: the best of each surface
+  /// and direction of approach come before any second best.
+  std::vector<Attempt> in_order() {
+    struct Ranked {
+      Attempt attempt;
+      double promise = 0;
+      int round = 0;
+    };
+    std::vector<Ranked> ranked;
+    for (const Candidate* candidate : candidates_) {
+      Attempt a;
+      a.part = part_;
+      a.candidate = candidate;
+      a.gripper = &gripper_;
+      a.around = around_;
+      a.base_from_tcp = here_.base_from_part * candidate->part_from_tcp;
+      if (const auto refusal = judge_place(facts_, a)) {
+        refuse(a, *refusal);
+        continue;
+      }
+      // In the bin or out of the workspace: cheaper to see than reach, and what forbids most places at walls.
+      if (const auto refusal = judge_walls(facts_, a)) {
+        refuse(a, *refusal);
+        continue;
+      }
+      const double offset = candidate->offset_mm / (0.25 * here_.part->part->diameter_mm);
+      ranked.push_back({std::move(a), candidate->priority * candidate->contact / (1 + offset), 0});
+      ranked.back().promise *= 0.5 + 0.5 * std::cos(ranked.back().attempt.tilt);
+    }
+    const auto better = [](const Ranked& a, const Ranked& b) { return a.promise > b.promise; };
+    std::stable_sort(ranked.begin(), ranked.end(), better);
+    std::map<std::string, int> rounds;
+    for (Ranked& r : ranked) r.round = rounds[r.attempt.candidate->family + from_where(r.attempt)]++;
+    std::stable_sort(ranked.begin(), ranked.end(), [](const Ranked& a, const Ranked& b) { return a.round < b.round; });
+    std::vector<Attempt> order;
+    for (Ranked& r : ranked) order.push_back(std::move(r.attempt));
+    return order;
+  }
+
+  /// From which side, and how steeply, a tool comes: upright, or one of eight sides by steps of 15 deg.
+  static std::string from_where(const Attempt& a) {
+    const int steep = static_cast<int>(a.tilt / (15 * kDegree) + 0.5);
+    if (steep == 0) return " upright";
+    const Vec3 in = a.base_from_tcp.linear().col(2);
+    return " " + std::to_string(steep) + " " + std::to_string(std::lround(std::atan2(in.y(), in.x()) / (kPi / 4)) & 7);
+  }
+
+  /// As it is, and where the arm refuses, turned to the other side of equal jaws.
+  bool look_closely(const Attempt& fits) {
+    const int turns = gripper_.jaws == 0 ? 1 : gripper_.jaws;
+    std::optional<Refusal> first;
+    for (int k = 0; k < turns; ++k) {
+      Attempt a = fits;
+      a.base_from_tcp.linear() =
+          a.base_from_tcp.linear() * Matrix3(rotation_from_vector(Vec3(0, 0, k * 2 * kPi / turns)));
+      // Equal jaws, but not always an equal body.
+      auto refusal = k > 0 ? judge_walls(facts_, a) : std::nullopt;
+      if (!refusal) refusal = judge_way(facts_, a);
+      if (!refusal) {
+        out_.grasps.push_back(scored(facts_, a));
+        return true;
+      }
+      if (!first) first = refusal;
+      const Why why = refusal->why;
+      if (why != Why::reach && why != Why::form && why < Why::arm_bin) break;
+    }
+    refuse(fits, *first);
+    return false;
+  }
+
+  const SceneFacts& facts_;
+  const PartHere& here_;
+  int part_;
+  const GripperShape& gripper_;
+  const DepthSpace* around_;
+  PartPlan& out_;
+  std::vector<const Candidate*> candidates_;
+};
+
 bool may_use(const PlanOptions& options, const std::string& gripper) {
   return options.grippers.empty() ||
          std::find(options.grippers.begin(), options.grippers.end(), gripper) != options.grippers.end();
 }
 
-RefusedGrasp refused_of(const SceneFacts& facts, const Attempt& attempt, const Refusal& refusal) {
-  (void)facts;
-  return {attempt.part,  attempt.gripper->gripper.name, attempt.candidate->family, refusal.why, refusal.value,
-          refusal.limit, attempt.base_from_tcp};
-}
-
-void plan_gripper(const SceneFacts& facts, int part, int gripper, PartPlan& out) {
-  const GraspPart& known = *facts.scene->parts[part].part;
-  int looked = 0, found = 0;
-  for (const Candidate& candidate : known.candidates) {
-    if (candidate.gripper != gripper) continue;
-    if (looked >= facts.options->looks || found >= facts.options->most_per_part) {
-      ++out.not_looked_at;
-      continue;
-    }
-    Attempt attempt;
-    attempt.part = part;
-    attempt.candidate = &candidate;
-    attempt.gripper = &known.grippers[gripper];
-    const auto refusal = judge(facts, attempt);
-    if (refusal) {
-      // What points the wrong way costs nothing, and does not count.
-      looked += refusal->why > Why::workspace;
-      out.refused.push_back(refused_of(facts, attempt, *refusal));
-    } else {
-      ++looked;
-      ++found;
-      out.grasps.push_back(scored(facts, attempt));
-    }
-  }
+/// What is against all grasps of a part.
+Checked judge_part(const SceneFacts& facts, int part) {
+  const PartHere& here = facts.scene->parts[part];
+  if (here.score < facts.options->min_score) return Refusal{Why::confidence, here.score, facts.options->min_score};
+  const double covered = facts.parts[part].covered;
+  if (covered > facts.options->max_covered) return Refusal{Why::covered, covered, facts.options->max_covered};
+  return {};
 }
 
 PartPlan plan_part(const SceneFacts& facts, int part) {
   PartPlan out;
   const PartHere& here = facts.scene->parts[part];
   if (!here.pick) return out;
+  const auto against = judge_part(facts, part);
+  std::optional<DepthSpace> around;
   for (int g = 0; g < static_cast<int>(here.part->grippers.size()); ++g) {
     const std::string& name = here.part->grippers[g].gripper.name;
     if (!may_use(*facts.options, name)) continue;
-    if (here.score < facts.options->min_score) {
-      out.refused.push_back(
-          {part, name, "", Why::confidence, here.score, facts.options->min_score, here.base_from_part});
+    if (against) {
+      out.refused.push_back({part, name, "", against->why, against->value, against->limit, here.base_from_part});
       continue;
     }
-    plan_gripper(facts, part, g, out);
+    if (facts.depth && !around) around = facts.depth->without(*here.part->tree, here.base_from_part);
+    GripperPlan(facts, part, g, around ? &*around : nullptr, out).run();
   }
   return out;
 }
@@ -117,7 +191,6 @@ const PathPoint* Grasp::at(Step step) const {
 }
 
 Plan plan_grasps(const Scene& scene, const PlanOptions& options) {
-  validate(options);
   const SceneFacts facts = make_facts(scene, options);
   std::vector<PartPlan> parts(scene.parts.size());
   parallel_each(static_cast<int>(parts.size()), [&](int i) { parts[i] = plan_part(facts, i); });
@@ -130,6 +203,9 @@ Plan plan_grasps(const Scene& scene, const PlanOptions& options) {
   std::stable_sort(plan.grasps.begin(), plan.grasps.end(),
                    [](const Grasp& a, const Grasp& b) { return a.score > b.score; });
   plan.reasons = counted(plan.refused);
+  if (scene.arm && scene.arm->arm->capsules.empty())
+    plan.warnings.push_back("arm " + scene.arm->arm->name +
+                            ": its file has no capsules; its links are taken as a seventh of its length thick");
   return plan;
 }
 

@@ -1,61 +1,107 @@
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
-#include "tribin/grasp/candidates.hpp"
+#include "contacts.hpp"
+#include "seeds.hpp"
+#include "tribin/core/parallel.hpp"
 
 namespace tribin::grasp {
 namespace {
 
-Pose tcp_pose(const Vec3& at, const Vec3& closing, const Vec3& approach) {
-  Pose pose = Pose::Identity();
-  pose.linear().col(0) = closing;
-  pose.linear().col(1) = approach.cross(closing);
-  pose.linear().col(2) = approach;
-  pose.translation() = at;
-  return pose;
+// Room a side with which the open jaws must pass the part itself; a scene may open them wider, and looks again.
+constexpr double kOpen_mm = 1, kGap_mm = 0.3;
+// Share of the pads that must touch: one ray of each jaw and a bit, so that it is a face or an edge and no corner.
+constexpr double kLeastPads = 0.05;
+// With that much of the pads on it a part is held as well as can be: rounds touch along a line only.
+constexpr double kGoodPads = 0.3;
+constexpr double kLeastMagnet = 0.7;
+
+Vec3 mass_center(const Part& part, const MeshTree& tree) {
+  Vec3 moment = Vec3::Zero();
+  double volume = 0;
+  const Vec3 origin = part.box_center();
+  for (std::uint32_t t = 0; t < tree.count(); ++t) {
+    const auto& c = tree.corners(t);
+    const Vec3 a = c[0] - origin, b = c[1] - origin, d = c[2] - origin;
+    const double v = a.dot(b.cross(d)) / 6;
+    moment += v * (a + b + d) / 4;
+    volume += v;
+  }
+  // An open mesh, or one of unknown winding, has no volume to speak of.
+  const Vec3 center = origin + moment / volume;
+  const bool good =
+      volume > 0 && ((center - part.box_min).array() >= 0).all() && ((part.box_max - center).array() >= 0).all();
+  return good ? center : origin;
+}
+
+/// A seed that holds.
+std::optional<Candidate> tried(const GraspPart& known, int gripper, const Seed& seed) {
+  const GripperShape& g = known.grippers[gripper];
+  const MeshTree& tree = *known.tree;
+  const auto contacts = g.jaws > 0 ? close_jaws(tree, g, seed.part_from_tcp) : set_cup(tree, g, seed.part_from_tcp);
+  if (!contacts) return {};
+  Candidate c;
+  c.family = seed.family;
+  c.gripper = gripper;
+  c.priority = seed.priority;
+  c.part_from_tcp = seed.taught ? seed.part_from_tcp : contacts->part_from_tcp;
+  c.opening_mm = contacts->opening_mm;
+  c.friction_angle = contacts->friction_angle;
+  const Vec3 arm = known.mass_center_mm - contacts->center;
+  const Vec3 line = c.part_from_tcp.linear().col(g.jaws == 2 ? 0 : 2);
+  c.offset_mm = (arm - arm.dot(line) * line).norm();
+  if (g.jaws > 0) {
+    c.contact = std::min(1.0, contacts->share / kGoodPads);
+    if (c.opening_mm < g.stroke_min() || c.opening_mm > g.stroke_max()) return {};
+  } else {
+    c.contact = contacts->share;
+  }
+  if (seed.taught) return c;  // who taught it knows
+  if (g.jaws > 0 && (contacts->share < kLeastPads || c.friction_angle > std::atan(g.gripper.friction))) return {};
+  if (g.jaws == 0 && contacts->share < (g.gripper.kind == GripperKind::suction ? 1 : kLeastMagnet)) return {};
+  const double room =
+      g.jaws == 0 ? 0
+                  : std::min(kOpen_mm, (g.inside ? c.opening_mm - g.stroke_min() : g.stroke_max() - c.opening_mm) / 2);
+  const double open = g.inside ? c.opening_mm - 2 * room : c.opening_mm + 2 * room;
+  if (!comes_free(tree, g, c.part_from_tcp, open, known.part->diameter_mm, std::min(kGap_mm, 0.5 * room + 1e-6)))
+    return {};
+  return c;
+}
+
+void add_candidates(GraspPart& known, int gripper) {
+  const GripperShape& g = known.grippers[gripper];
+  const std::vector<Seed> seeds = known.cell.pick_points.empty()
+                                      ? seeds_of(*known.part, *known.tree, g, known.mass_center_mm)
+                                      : taught_seeds(*known.part, known.cell, g.gripper.name);
+  std::vector<std::optional<Candidate>> found(seeds.size());
+  parallel_ranges(static_cast<int>(seeds.size()), 16, [&](int begin, int end) {
+    for (int i = begin; i < end; ++i) found[i] = tried(known, gripper, seeds[i]);
+  });
+  const std::size_t before = known.candidates.size();
+  for (const auto& candidate : found)
+    if (candidate) known.candidates.push_back(*candidate);
+  if (known.candidates.size() == before)
+    known.warnings.push_back("part " + known.part->name + ": gripper " + g.gripper.name + " finds no hold (of " +
+                             std::to_string(seeds.size()) + " places tried)");
 }
 
 }  // namespace
 
 GraspPart prepare_grasps(const Part& part, const CellPart& cell, std::span<const Gripper> grippers) {
-  GraspPart out;
-  out.part = &part;
-  out.cell = cell;
+  GraspPart known;
+  known.part = &part;
+  known.cell = cell;
+  known.tree = std::make_shared<const MeshTree>(part.mesh);
+  known.mass_center_mm = mass_center(part, *known.tree);
   for (const Gripper& gripper : grippers) {
-    const bool wanted = cell.grippers.empty() ||
-                        std::find(cell.grippers.begin(), cell.grippers.end(), gripper.name) != cell.grippers.end();
-    if (!wanted) continue;
-    out.grippers.push_back(gripper_shape(gripper));
-    const int g = static_cast<int>(out.grippers.size()) - 1;
-    const GripperShape& shape = out.grippers.back();
-    for (const PickPoint& point : cell.pick_points) {
-      if (!point.gripper.empty() && point.gripper != gripper.name) continue;
-      Candidate c;
-      c.family = "taught " + point.name;
-      c.gripper = g;
-      c.part_from_tcp = point.part_from_tcp;
-      c.opening_mm = shape.stroke_max();
-      c.priority = point.priority;
-      out.candidates.push_back(c);
-    }
-    if (!cell.pick_points.empty() || shape.jaws != 2) continue;
-    for (const Primitive& p : part.model.primitives) {
-      if (p.type != PrimitiveType::cylinder || p.concave) continue;
-      Vec3 u, v;
-      orthonormal_basis(p.axis, u, v);
-      for (int k = 0; k < 24; ++k) {
-        const double angle = k * 15 * kDegree;
-        const Vec3 approach = std::cos(angle) * u + std::sin(angle) * v;
-        Candidate c;
-        c.family = "cylinder " + std::to_string(p.id) + " radial";
-        c.gripper = g;
-        c.part_from_tcp = tcp_pose(p.point, approach.cross(p.axis), approach);
-        c.opening_mm = 2 * p.radius_mm;
-        out.candidates.push_back(c);
-      }
-    }
+    const auto& names = cell.grippers;
+    if (!names.empty() && std::find(names.begin(), names.end(), gripper.name) == names.end()) continue;
+    known.grippers.push_back(gripper_shape(gripper));
+    for (const std::string& warning : known.grippers.back().warnings) known.warnings.push_back(warning);
+    add_candidates(known, static_cast<int>(known.grippers.size()) - 1);
   }
-  return out;
+  return known;
 }
 
 }  // namespace tribin::grasp

@@ -75,6 +75,7 @@ struct PlanOptions {
   double limit_margin_rad = 2 * kDegree;  ///< of joints, see robot::Margins
   double singularity = 0.1;               ///< the same
   double min_score = 0;                   ///< of an instance, [0, 1]
+  double max_covered = 0.1;               ///< share of a part, seen from above, that something may lie on, [0, 1]
   int looks = 60;                         ///< > 0, candidates looked at closely, a part and gripper
   int most_per_part = 3;                  ///< > 0, grasps given out, a part and gripper
   std::vector<FailedPick> failed;
