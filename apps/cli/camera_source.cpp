@@ -6,6 +6,7 @@
 #include "tribin/io/frames_file.hpp"
 #include "tribin/io/taken_file.hpp"
 #ifdef TRIBIN_WITH_SIM
+#include "tribin/sim/cell_view.hpp"
 #include "tribin/sim/simulated_camera.hpp"
 #endif
 #ifdef TRIBIN_WITH_GENICAM
@@ -31,7 +32,7 @@ std::unique_ptr<Camera> open_sim(const SourceArguments& arguments) {
   const Taken taken = taken_of(arguments);
   const WorkCell cell = read_work_cell_logged(arguments.source.substr(std::string(kSim).size()));
   return sim::open_simulated_camera(
-      cell_view_of(cell, taken.base_from_flange), meshes_of(cell),
+      sim::cell_view_of(cell, taken.base_from_flange), meshes_of(cell),
       {.level = sim::level_of(arguments.level), .seed = arguments.seed, .frames = arguments.rendered, .taken = taken});
 }
 #else

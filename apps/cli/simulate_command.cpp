@@ -8,6 +8,7 @@
 #include "tribin/io/cad_files.hpp"
 #include "tribin/io/taken_file.hpp"
 #ifdef TRIBIN_WITH_SIM
+#include "tribin/sim/cell_view.hpp"
 #include "tribin/sim/dataset.hpp"
 #endif
 
@@ -34,7 +35,7 @@ int run(const Options& options, const Context& context) {
     const WorkCell cell = read_work_cell_logged(options.cell);
     std::optional<Pose> base_from_flange;
     if (!options.flange.empty()) base_from_flange = robot_pose_from_text(options.flange);
-    dataset.cell = cell_view_of(cell, base_from_flange);
+    dataset.cell = sim::cell_view_of(cell, base_from_flange);
     if (options.parts.empty()) dataset.parts = meshes_of(cell);
   }
   dataset.level = sim::level_of(options.level);

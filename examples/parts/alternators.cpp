@@ -79,4 +79,19 @@ TopoDS_Shape alternator_b() {
   return cut(body, tools);
 }
 
+TopoDS_Shape battery() {
+  // Case on a hold-down foot, lid with six plugs in a row, two terminals of different size and shape, a label's pocket.
+  TopoDS_Shape body = block(0, -55, 55, -33, 33, 0, 78);
+  std::vector<TopoDS_Shape> more = {
+      block(0, -59, 59, -37, 37, 0, 10),   // foot
+      block(0, -56, 56, -34, 34, 78, 90),  // lid
+      block(0, -50, -32, 8, 26, 90, 103),  // terminal, square
+      rod(41, 17, 8, 90, 106),             // terminal, round
+  };
+  for (int i = 0; i < 6; ++i) more.push_back(rod(-40 + 16 * i, -17, 6.5, 90, 94));
+  body = fused(body, more);
+  return cut(body, {rod(-41, 17, 3.3, 88, 110), rod(41, 17, 3.3, 98, 110), block(0, -45, 45, 31.5, 40, 25, 65),
+                    block(0, 53.5, 60, -20, 20, 35, 60)});
+}
+
 }  // namespace parts

@@ -16,4 +16,7 @@ namespace parts {
 TopoDS_Shape alternator_a();
 TopoDS_Shape alternator_b();
 
+/// A small starter battery, to lie among them. z up from the foot, x along its length; the terminals tell the ends.
+TopoDS_Shape battery();
+
 }  // namespace parts

@@ -1,5 +1,5 @@
-// Writes alternator_a and alternator_b as STEP, STL and DXF: the parts of the demo and of the paper's experiment.
-// usage: make_alternators DIRECTORY
+// Writes alternator_a, alternator_b and battery as STEP, STL and DXF: the parts of the demo and of the paper's
+// experiment. usage: make_alternators DIRECTORY
 #include <Interface_Static.hxx>
 #include <Message.hxx>
 #include <Message_Messenger.hxx>
@@ -141,6 +141,7 @@ int main(int argc, char** argv) try {
   };
   make(parts::alternator_a(), "alternator_a");
   make(parts::alternator_b(), "alternator_b");
+  make(parts::battery(), "battery");
   return 0;
 } catch (const Standard_Failure& e) {
   std::cerr << "make_alternators: " << e.GetMessageString() << '\n';

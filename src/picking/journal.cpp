@@ -58,6 +58,9 @@ void follow(JournalState& state, const Entry& entry, const std::string& where) {
   };
   if (entry.cycle) state.last_cycle = entry.cycle;
   state.last_scene = std::max(state.last_scene, entry.scene);
+  const bool ended = entry.event == Event::picked || entry.event == Event::missed || entry.event == Event::placed ||
+                     entry.event == Event::lost || entry.event == Event::moved;
+  if (ended && entry.cycle) state.last_taken = entry.cycle;
   switch (entry.event) {
     case Event::new_rack:
       state.filling.assign(state.filling.size(), {});
@@ -78,6 +81,7 @@ void follow(JournalState& state, const Entry& entry, const std::string& where) {
       break;
     case Event::missed:
     case Event::moved:
+    case Event::not_taken:
       state.open.reset();
       break;
     case Event::placed:

@@ -8,13 +8,13 @@
 namespace tribin::picking {
 namespace {
 
-constexpr std::array kNames = {"new_rack", "pick_ordered", "picked",       "missed", "place_ordered",
-                               "placed",   "lost",         "move_ordered", "moved",  "operator_said"};
+constexpr std::array kNames = {"new_rack", "pick_ordered", "picked", "missed",    "place_ordered", "placed",
+                               "lost",     "move_ordered", "moved",  "not_taken", "operator_said"};
 
 Entry entry_of(const io::JsonPlace& line) {
   line.must_be_object("a journal entry");
-  line.only_keys(
-      {"event", "cycle", "scene", "part", "gripper", "grasp", "slot", "base_from_part", "tcp_from_part", "note"});
+  line.only_keys({"event", "cycle", "scene", "part", "gripper", "grasp", "slot", "base_from_part", "tcp_from_part",
+                  "opening_mm", "note"});
   const auto text = [&line](const char* key) {
     return line.has(key) ? line.at(key, "a text").text("a text") : std::string();
   };
@@ -31,6 +31,7 @@ Entry entry_of(const io::JsonPlace& line) {
   entry.part = text("part"), entry.gripper = text("gripper"), entry.grasp = text("grasp"), entry.note = text("note");
   if (line.has("base_from_part")) entry.base_from_part = io::pose_of(line.at("base_from_part", "a pose"));
   if (line.has("tcp_from_part")) entry.tcp_from_part = io::pose_of(line.at("tcp_from_part", "a pose"));
+  if (line.has("opening_mm")) entry.opening_mm = line.at("opening_mm", "mm").number(0, 1e5, "a length in mm");
   return entry;
 }
 
@@ -48,6 +49,7 @@ std::string line_of(const Entry& entry) {
     json["gripper"] = entry.gripper;
     json["grasp"] = entry.grasp;
     json["slot"] = entry.slot;
+    json["opening_mm"] = entry.opening_mm;
     json["base_from_part"] = io::json_of(entry.base_from_part);
     json["tcp_from_part"] = io::json_of(entry.tcp_from_part);
   } else if (entry.slot) {

@@ -1,15 +1,18 @@
 #include "tribin/robot/handshake.hpp"
 
+#include <cmath>
+
 namespace tribin::robot {
 namespace {
 
 /// The place of each variable of the hand-shake.
 struct Places {
   int command, status, part_class, result, count;  // B
-  int cycle, taken, done;                          // I
+  int cycle, taken, done, opening;                 // I
 };
 Places places_of(const HandshakeVariables& v) {
-  return {v.bytes, v.bytes + 1, v.bytes + 2, v.bytes + 3, v.bytes + 4, v.integers, v.integers + 1, v.integers + 2};
+  return {v.bytes,    v.bytes + 1,    v.bytes + 2,    v.bytes + 3,   v.bytes + 4,
+          v.integers, v.integers + 1, v.integers + 2, v.integers + 3};
 }
 
 /// The first of the P variables that belong to a command.
@@ -124,6 +127,7 @@ class Shake {
     for (const CartesianPosition& position : order.positions) write_position(number++, position);
     write_byte(at_.part_class, order.part_class);
     write_byte(at_.count, way ? static_cast<int>(order.positions.size()) : 0);
+    write_integer(at_.opening, static_cast<int>(std::lround(order.opening_mm * 10)));
     write_integer(at_.cycle, order.cycle);
     write_byte(at_.status, 0);
     write_byte(at_.result, 0);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "sim/live_heap.hpp"
 #include "sim/random.hpp"
 #include "sim/rigid_world.hpp"
 #include "sim/solid.hpp"
@@ -50,12 +51,6 @@ Pose start_of(const Solid& solid, double length, double width, double above, Ran
                     above + box.size().z() / 2 + kClear);
   pose.translation() = middle - box.center();
   return pose;
-}
-
-/// How far any point of a part has moved, at most.
-double largest_motion(const Solid& solid, const Pose& from, const Pose& to) {
-  const Vec3 centre = solid.state().part_from_body.translation();
-  return (to * centre - from * centre).norm() + rotation_angle(from.linear(), to.linear()) * solid.diameter_mm();
 }
 
 /// Notes how deep a part reaches into floor and walls, how high it reaches, and how high it leans on the walls.

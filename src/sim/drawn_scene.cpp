@@ -172,21 +172,12 @@ Heap draw_heap(const SceneStock& stock, SceneKind kind, const LevelSettings& lev
   return heap;
 }
 
-/// The bin and who looks at it.
-struct View {
-  Bin bin;
-  Pose camera_from_bin = Pose::Identity();
-  double distance_mm = 0;    ///< to the bin's floor, along the optical axis
-  double farthest_mm = 0;    ///< upper bound of depths
-  double table_side_mm = 0;  ///< cells only: a camera that looks aslant would see an endless table up to the horizon
-};
-
 // Sensors for larger bins have wider baselines: beyond 800 mm the angle between camera and projector stays.
 double baseline_scale(double distance_mm) { return std::max(1.0, distance_mm / 800); }
 
-View drawn_view(const Heap& heap, const LevelSettings& level, Random& random, StructuredLight& sensor) {
+BinView drawn_view(const Heap& heap, const LevelSettings& level, Random& random, StructuredLight& sensor) {
   // The rim is as high as any part leans on the walls at least; bins are filled to the brim, or hardly half.
-  View view;
+  BinView view;
   view.bin = {heap.inside.length, heap.inside.width, 0, 5};
   Bin& bin = view.bin;
   bin.height_mm = std::max({40.0, heap.fill.wall_contact_mm + 5, heap.fill.top_mm * random.uniform(0.7, 1.5)});
@@ -202,8 +193,10 @@ View drawn_view(const Heap& heap, const LevelSettings& level, Random& random, St
   return view;
 }
 
-View cell_view(const CellView& cell, const Heap& heap, const LevelSettings& level, Random& random,
-               StructuredLight& sensor) {
+}  // namespace
+
+BinView view_of_cell(const CellView& cell, double top_mm, const LevelSettings& level, Random& random,
+                     StructuredLight& sensor) {
   sensor = sensor_of(level, random);
   sensor.camera = cell.camera;
   if (cell.noise.sigma_mm > 0) sensor.noise_mm = cell.noise.sigma_mm;
@@ -216,19 +209,28 @@ View cell_view(const CellView& cell, const Heap& heap, const LevelSettings& leve
                     std::to_string(floor.x()) + ", " + std::to_string(floor.y()) + ", " + std::to_string(floor.z()) +
                     " mm in its frame; wanted it in view (camera.file, hand_eye, bin.base_from_bin)");
   constexpr double kTableSides = 4;  // of the bin's length: what stands around a bin
-  View view{cell.bin, cell.camera_from_bin, floor.z(), 0,
-            kTableSides * std::max(cell.bin.length_mm, cell.bin.width_mm)};
+  BinView view{cell.bin, cell.camera_from_bin, floor.z(), 0,
+               kTableSides * std::max(cell.bin.length_mm, cell.bin.width_mm)};
   for (int i = 0; i < 4; ++i) {
     const double half = view.table_side_mm / 2;
     const Vec3 corner = cell.camera_from_bin * Vec3(i & 1 ? half : -half, i & 2 ? half : -half, -cell.bin.wall_mm);
     view.farthest_mm = std::max(view.farthest_mm, 1.25 * corner.z());
   }
-  sensor.reference_mm = (cell.camera_from_bin * Vec3(0, 0, heap.fill.top_mm / 2)).z();
+  sensor.reference_mm = (cell.camera_from_bin * Vec3(0, 0, top_mm / 2)).z();
   sensor.baseline_mm *= baseline_scale(view.distance_mm);
   return view;
 }
 
-}  // namespace
+std::vector<Mesh> bin_and_table_meshes(const BinView& view) {
+  return {bin_mesh(view.bin), table_mesh(view.table_side_mm)};
+}
+
+std::vector<Body> table_and_bin(const BinView& view, const std::vector<Mesh>& meshes) {
+  Pose below = Pose::Identity();
+  below.translation().z() = -view.bin.wall_mm - 1;  // under the bin's feet, so that the two planes do not fight
+  return {{&meshes[1], view.camera_from_bin * below, kTableAlbedo, /*shine=*/0, /*counted=*/false},
+          {meshes.data(), view.camera_from_bin, kBinAlbedo, /*shine=*/0, /*counted=*/false}};
+}
 
 SceneStock make_stock(const std::vector<Mesh>& parts, SceneKind kind, const LevelSettings& level) {
   SceneStock stock;
@@ -284,17 +286,12 @@ DrawnScene draw_bin_scene(const SceneStock& stock, SceneKind kind, const LevelSe
   Random random(seed);
   const Heap heap = draw_heap(stock, kind, level, random, cell);
   DrawnScene scene;
-  const View view =
-      cell ? cell_view(*cell, heap, level, random, scene.sensor) : drawn_view(heap, level, random, scene.sensor);
+  const BinView view = cell ? view_of_cell(*cell, heap.fill.top_mm, level, random, scene.sensor)
+                            : drawn_view(heap, level, random, scene.sensor);
   scene.camera_from_world = view.camera_from_bin;
 
-  scene.own = {bin_mesh(view.bin)};
-  if (cell) scene.own.push_back(table_mesh(view.table_side_mm));
-  Pose below = Pose::Identity();
-  below.translation().z() = -view.bin.wall_mm - 1;  // under the bin's feet, so that the two planes do not fight
-  scene.bodies = {{cell ? &scene.own[1] : &stock.table, scene.camera_from_world * below, kTableAlbedo, /*shine=*/0,
-                   /*counted=*/false},
-                  {scene.own.data(), scene.camera_from_world, kBinAlbedo, /*shine=*/0, /*counted=*/false}};
+  scene.own = bin_and_table_meshes(view);
+  scene.bodies = table_and_bin(view, scene.own);
   scene.object_of_body = {0, 0};
   const std::vector<double> albedo = drawn_albedos(stock.parts->size(), random);
   for (std::size_t i = 0; i < heap.items.size(); ++i) {

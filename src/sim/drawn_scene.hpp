@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
+#include "sim/random.hpp"
 #include "tribin/sim/bin_scene.hpp"
 #include "tribin/sim/dataset.hpp"
 #include "tribin/sim/stable_rests.hpp"
@@ -20,6 +21,26 @@ struct DrawnScene {
   nlohmann::ordered_json info;  ///< what is special to the kind
   std::vector<Mesh> own;        ///< meshes that the bodies point to: reserved before, never grown after
 };
+
+/// A bin and who looks at it.
+struct BinView {
+  Bin bin;
+  Pose camera_from_bin = Pose::Identity();
+  double distance_mm = 0;  ///< to the bin's floor, along the optical axis
+  double farthest_mm = 0;  ///< upper bound of depths
+  double table_side_mm =
+      4000;  ///< less in cells: a camera that looks aslant would see an endless table up to the horizon
+};
+
+/// How a cell's camera sees its bin, and how it measures there. \param top_mm  of the heap
+/// \throws Error out_of_range where it does not see the middle of the floor
+BinView view_of_cell(const CellView& cell, double top_mm, const LevelSettings& level, Random& random,
+                     StructuredLight& sensor);
+
+/// Table and bin before the camera, the bodies that a scene of a bin begins with. \param meshes  two, which must stay
+std::vector<Body> table_and_bin(const BinView& view, const std::vector<Mesh>& meshes);
+/// The meshes for `table_and_bin`.
+std::vector<Mesh> bin_and_table_meshes(const BinView& view);
 
 /// What is made once for all scenes of a data set. Points into the parts, which must stay.
 struct SceneStock {

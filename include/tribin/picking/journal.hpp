@@ -23,6 +23,7 @@ enum class Event {
   lost,          ///< on the way: it is not in the hand and not in the slot
   move_ordered,  ///< way points, pushes and whatever else changes neither hand nor rack; next: moved
   moved,
+  not_taken,      ///< the controller never had the order: nothing was done
   operator_said,  ///< what is in the hand and in the slot
 };
 std::string_view name_of(Event event);
@@ -36,6 +37,7 @@ struct Entry {
   int slot = 0;                            ///< of places: 0 = the station for gripping anew
   Pose base_from_part = Pose::Identity();  ///< as it was measured
   Pose tcp_from_part = Pose::Identity();   ///< in the hand
+  double opening_mm = 0;                   ///< of the jaws before they close, and when they let go
   std::string note;                        ///< for people
 };
 
@@ -46,6 +48,7 @@ struct JournalState {
   std::optional<Entry> at_station;  ///< put down to be gripped anew
   std::optional<Entry> open;        ///< an order whose end is not known
   int last_cycle = 0, last_scene = 0;
+  int last_taken = 0;  ///< the last cycle that the controller is known to have had; 0 = none
   int placed = 0;
 };
 

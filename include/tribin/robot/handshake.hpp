@@ -25,6 +25,7 @@ struct CycleOrder {
   CycleCommand command = CycleCommand::pick;
   int cycle = 1;                             ///< 1..32767
   int part_class = 0;                        ///< 0..255, for jobs of classes
+  double opening_mm = 0;                     ///< of the jaws before they close, and when they let go; 0 = not said
   std::vector<CartesianPosition> positions;  ///< 3: before, at, after; way points: 1 to 6
 };
 

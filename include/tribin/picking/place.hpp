@@ -1,0 +1,69 @@
+#pragma once
+
+#include <array>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "tribin/grasp/gripper_shape.hpp"
+#include "tribin/kinematics/inverse.hpp"
+#include "tribin/part/part.hpp"
+#include "tribin/picking/rack.hpp"
+
+/// Putting down a part that is in the hand: where, and the way there. Base frame.
+namespace tribin::picking {
+
+/// The arm with a gripper on it.
+struct ArmWithTool {
+  const robot::RobotModel* robot = nullptr;
+  const robot::Arm* arm = nullptr;
+  Pose flange_from_tcp = Pose::Identity();
+  std::optional<CellRange> workspace;
+  double limit_margin_rad = 2 * kDegree;
+  double singularity = 0.1;
+};
+
+/// A place of the tool with the joint angles that bring it there.
+struct Stop {
+  Pose base_from_tcp = Pose::Identity();
+  robot::Joints joints{};
+};
+
+/// How to stand at each of the places, in one configuration, with no turn that is not needed. \return none where one is
+/// out of reach or of the workspace
+std::optional<std::vector<Stop>> stops_at(const ArmWithTool& arm, std::span<const Pose> base_from_tcp,
+                                          const std::optional<robot::Joints>& from = {}, bool one_form = true);
+
+/// A part in the hand.
+struct Held {
+  const Part* part = nullptr;
+  const grasp::GripperShape* gripper = nullptr;
+  double opening_mm = 0;  ///< of the jaws when they let go
+  Pose tcp_from_part = Pose::Identity();
+};
+
+/// A place that was found.
+struct Placing {
+  const Slot* slot = nullptr;  ///< none = the station
+  Pose base_from_part = Pose::Identity();
+  std::array<Stop, 3> stops;  ///< before, at, after
+};
+
+/// What already stands where a part is to be put.
+struct Standing {
+  const Part* part = nullptr;
+  Pose base_from_part = Pose::Identity();
+};
+
+/// The first of the slots in which the part can be put: reached before, at and after in one configuration, the open
+/// gripper and the part clear of what stands there and of the slot's own plane.
+/// \param slot_from_part  how it stands in a slot, any of them
+std::optional<Placing> plan_place(const ArmWithTool& arm, const Held& held, std::span<const Slot* const> slots,
+                                  std::span<const Pose> slot_from_part, std::span<const Standing> standing);
+
+/// Way points between two places of the tool, the last one excluded: up, across at a safe height, and above where it
+/// goes; or the taught ones. At most six.
+/// \param travel_mm  the safe height of the TCP
+std::vector<Pose> way_between(const Pose& from, const Pose& to, double travel_mm, std::span<const Pose> taught);
+
+}  // namespace tribin::picking

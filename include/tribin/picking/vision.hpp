@@ -1,0 +1,67 @@
+#pragma once
+
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tribin/camera/camera.hpp"
+#include "tribin/config/work_cell.hpp"
+#include "tribin/grasp/grasp.hpp"
+#include "tribin/kinematics/arm.hpp"
+
+/// What the cycle asks of camera, recognition and grasp planning.
+namespace tribin::picking {
+
+/// Where a part of a class may be put, any of the poses will do.
+using Places = std::map<std::string, std::vector<Pose>>;
+
+/// What one scan shows.
+struct Sight {
+  std::string status;               ///< of the finder: ok, empty, not_empty_no_object, no_data, time_limit
+  std::map<std::string, int> seen;  ///< parts of each class whose pose is sure
+  double find_ms = 0;               ///< normals to poses, of this machine
+  double age_s = 0;                 ///< of the scan, when it was taken in
+  std::vector<std::string> warnings;
+};
+
+class Vision {
+ public:
+  virtual ~Vision() = default;
+  /// Takes a scan and finds the parts in it.
+  virtual Sight scan() = 0;
+  /// The last scan. \return null before the first one, and where there is no camera
+  virtual const Scan* last_scan() const { return nullptr; }
+  /// Grasps for what the last scan showed. May be asked again with other options.
+  virtual grasp::Plan plan(const grasp::PlanOptions& options, const Places& places) = 0;
+  virtual grasp::PushPlan plan_pushes(const grasp::PlanOptions& options) = 0;
+  /// Grasps for a part that stands where it was put, with nothing around it.
+  virtual grasp::Plan plan_standing(const std::string& part, const Pose& base_from_part,
+                                    const grasp::PlanOptions& options, const Places& places) = 0;
+  /// A part of the last scan. \param index  Grasp::part
+  virtual grasp::PartHere part(int index) const = 0;
+  /// Of a class. \throws Error bad_input where it has none of that name
+  virtual const Part& model(const std::string& name) const = 0;
+};
+
+/// Vision by a camera. \param parts  compiled, with the names of the cell's parts
+/// All must outlive it.
+struct VisionParts {
+  const WorkCell* cell = nullptr;
+  const std::vector<Part>* parts = nullptr;
+  Camera* camera = nullptr;
+  const robot::RobotModel* robot = nullptr;  ///< none: reach is not checked
+  std::optional<Rig> rig = {};               ///< of a camera that gives frames
+  bool any_age = false;                      ///< recorded scans, for trials
+};
+/// \throws Error bad_input where a gripper cannot be used, or the cell lacks what is needed
+std::unique_ptr<Vision> open_vision(const VisionParts& from);
+
+/// The arm that a cell's robot drives. \throws Error bad_input
+const robot::Arm& arm_of(const WorkCell& cell, const robot::RobotModel& robot);
+
+/// All poses in which a part looks as it does in this one: its symmetries, turns about an axis in steps of 15 deg.
+std::vector<Pose> alike(const Part& part, const Pose& pose);
+
+}  // namespace tribin::picking

@@ -1,0 +1,193 @@
+#include "picking/chooser.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+#include "tribin/core/error.hpp"
+
+namespace tribin::picking {
+namespace {
+
+constexpr double kFirstTilt = 30 * kDegree;  // of an approach, before anything steeper is tried
+constexpr int kMostPerPart = 12;             // grasps of a part that are looked at for a way into a slot
+constexpr double kTravelGap_mm = 20;         // over all that stands
+
+/// What software refuses of a motion, whatever the controller does.
+bool of_motion(robot::RefusalCode code) { return code >= robot::RefusalCode::not_finite; }
+
+PlaceError error_of(const WorkCell& cell, const Choice& choice) {
+  PlaceError error;
+  const Matrix3 position = choice.part.covariance.topLeftCorner<3, 3>();
+  error.pose = std::sqrt(std::max(
+      0.0, Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(Eigen::Matrix3d(position)).eigenvalues().maxCoeff()));
+  error.hand_eye = cell.hand_eye.sigma_mm;
+  error.robot = cell.robots.front().sigma_mm;
+  for (const Gripper& gripper : cell.grippers)
+    if (gripper.name == choice.grasp.gripper) error.grip = gripper.slip_mm;
+  return error;
+}
+
+}  // namespace
+
+Chooser::Chooser(const WorkCell& cell, const robot::RobotModel& robot, Vision& vision,
+                 const robot::SafetyLimits& limits)
+    : cell_(cell), robot_(robot), vision_(vision), limits_(limits) {
+  const auto want = [&cell](bool there, const char* what) {
+    if (!there)
+      throw Error(ErrorCode::bad_input, cell.file.string() + ": saw no " + what + ", wanted one to pick and place");
+  };
+  want(cell.rack.has_value(), "[rack]");
+  want(!cell.grippers.empty(), "[[gripper]]");
+  want(!cell.parts.empty(), "[[part]]");
+  want(!cell.robots.empty(), "[[robot]]");
+  want(cell.safety.workspace_mm.has_value(), "safety.workspace_mm");
+  slots_ = slots_of(*cell.rack);
+  for (const Gripper& gripper : cell.grippers) shapes_.push_back(grasp::gripper_shape(gripper));
+}
+
+const CellPart& Chooser::cell_part(const std::string& name) const {
+  for (const CellPart& part : cell_.parts)
+    if (part.name == name) return part;
+  throw Error(ErrorCode::bad_input, cell_.file.string() + ": saw no [[part]] called " + name + ", wanted one");
+}
+
+int Chooser::tool_of(const std::string& gripper) const {
+  for (std::size_t i = 0; i < cell_.grippers.size(); ++i)
+    if (cell_.grippers[i].name == gripper) return static_cast<int>(i) + 1;
+  throw Error(ErrorCode::bad_input, cell_.file.string() + ": saw no [[gripper]] called " + gripper + ", wanted one");
+}
+
+const grasp::GripperShape& Chooser::shape(const std::string& gripper) const {
+  return shapes_[static_cast<std::size_t>(tool_of(gripper)) - 1];
+}
+
+ArmWithTool Chooser::arm_with(const std::string& gripper) const {
+  ArmWithTool arm;
+  arm.robot = &robot_;
+  arm.arm = &arm_of(cell_, robot_);
+  arm.flange_from_tcp = shape(gripper).gripper.flange_from_tcp;
+  arm.workspace = cell_.safety.workspace_mm;
+  arm.limit_margin_rad = limits_.limit_margin_rad;
+  arm.singularity = limits_.singularity;
+  return arm;
+}
+
+Pose Chooser::station_pose(const std::string& part) const {
+  return cell_.regrasp->base_from_station * cell_part(part).slot_from_part;
+}
+
+Places Chooser::places(const Filling& filling) const {
+  Places out;
+  for (const CellPart& part : cell_.parts) {
+    std::vector<Pose> poses;
+    for (const Slot* slot : open_slots(slots_, filling, cell_.rack->when_missing)) {
+      if (!may_stand(*slot, part.name)) continue;
+      for (const Pose& pose : alike(vision_.model(part.name), slot->base_from_slot * part.slot_from_part))
+        poses.push_back(pose);
+    }
+    if (poses.empty()) continue;  // no slot waits for it
+    if (has_station())
+      for (const Pose& pose : alike(vision_.model(part.name), station_pose(part.name))) poses.push_back(pose);
+    out[part.name] = std::move(poses);
+  }
+  return out;
+}
+
+grasp::PlanOptions Chooser::plan_options(Resort resort, std::vector<grasp::FailedPick> failed) const {
+  grasp::PlanOptions options;
+  options.limit_margin_rad = limits_.limit_margin_rad;
+  options.singularity = limits_.singularity;
+  options.min_score = limits_.min_score;
+  options.most_per_part = kMostPerPart;
+  options.failed = std::move(failed);
+  if (resort < Resort::full_tilt) options.max_tilt_rad = kFirstTilt;
+  if (resort == Resort::none)
+    for (const CellPart& part : cell_.parts) {
+      const std::string& first = part.grippers.empty() ? cell_.grippers.front().name : part.grippers.front();
+      if (std::find(options.grippers.begin(), options.grippers.end(), first) == options.grippers.end())
+        options.grippers.push_back(first);
+    }
+  return options;
+}
+
+std::optional<Placing> Chooser::place(const std::string& part, const std::string& gripper, double opening_mm,
+                                      const Pose& tcp_from_part, const Filling& filling, bool station) const {
+  std::vector<const Slot*> open;
+  Slot at_station;
+  if (station) {
+    at_station.base_from_slot = cell_.regrasp->base_from_station;
+    open.push_back(&at_station);
+  } else {
+    for (const Slot* slot : open_slots(slots_, filling, cell_.rack->when_missing))
+      if (may_stand(*slot, part)) open.push_back(slot);
+  }
+  std::vector<Standing> standing;
+  for (std::size_t i = 0; i < filling.size(); ++i)
+    if (!filling[i].empty())
+      standing.push_back({&vision_.model(filling[i]), slots_[i].base_from_slot * cell_part(filling[i]).slot_from_part});
+  const Held held{&vision_.model(part), &shape(gripper), opening_mm, tcp_from_part};
+  auto placing = plan_place(arm_with(gripper), held, open, alike(*held.part, cell_part(part).slot_from_part), standing);
+  if (placing && station) placing->slot = nullptr;
+  return placing;
+}
+
+std::optional<Choice> Chooser::choose(const grasp::Plan& plan, const Filling& filling,
+                                      std::vector<std::string>& why) const {
+  for (const bool station : {false, true}) {
+    if (station && !has_station()) break;
+    for (const grasp::Grasp& grasp : plan.grasps) {
+      const Pose tcp_from_part = grasp.part_from_tcp.inverse();
+      auto placing = place(grasp.part_name, grasp.gripper, grasp.opening_before_mm, tcp_from_part, filling, station);
+      if (!placing) continue;
+      const ArmWithTool arm = arm_with(grasp.gripper);
+      std::vector<Pose> way = way_between(grasp.path.back().base_from_tcp, placing->stops[0].base_from_tcp, travel_mm(),
+                                          cell_.robots.front().way_points);
+      if (!stops_at(arm, way, grasp.path.back().joints, false)) continue;
+      Choice choice{grasp, vision_.part(grasp.part), std::move(*placing)};
+      const std::vector<robot::Refusal> refusals = refusals_of(choice, 0);
+      if (refusals.empty()) return choice;
+      for (const robot::Refusal& refusal : refusals)
+        if (std::find(why.begin(), why.end(), refusal.message) == why.end()) why.push_back(refusal.message);
+    }
+  }
+  return {};
+}
+
+std::vector<robot::Refusal> Chooser::refusals_of(const Choice& choice, double scan_age_s) const {
+  robot::CommandFacts facts;
+  facts.kind = robot::CommandKind::motion;
+  robot::MotionFacts& motion = facts.motion;
+  for (const grasp::PathPoint& point : choice.grasp.path) motion.base_from_tcp.push_back(point.base_from_tcp);
+  for (const Stop& stop : choice.placing.stops) motion.base_from_tcp.push_back(stop.base_from_tcp);
+  motion.tool = tool_of(choice.grasp.gripper);
+  motion.scan = robot::ScanFacts{scan_age_s, 0, 0, false, choice.part.score, choice.part.visible};
+  const bool known = !cell_.hand_eye.parent_from_camera.isApprox(Pose::Identity());
+  if (known) motion.hand_eye = robot::HandEyeFacts{0, cell_.hand_eye.sigma_mm};
+  if (choice.placing.slot) {
+    motion.slot = robot::SlotFacts{false, may_stand(*choice.placing.slot, choice.grasp.part_name)};
+    // A slot that is too tight is never right.
+    if (const auto tight = too_tight(*choice.placing.slot, error_of(cell_, choice), cell_.rack->chamfer_mm))
+      return {{robot::RefusalCode::slot_class, *tight}};
+  }
+  std::vector<robot::Refusal> out;
+  for (robot::Refusal& refusal : robot::refusals(facts, limits_))
+    if (of_motion(refusal.code)) out.push_back(std::move(refusal));
+  return out;
+}
+
+double Chooser::travel_mm() const {
+  double top = -1e300, below = 0;
+  for (const CellPart& part : cell_.parts) below = std::max(below, vision_.model(part.name).diameter_mm);
+  for (const Slot& slot : slots_) top = std::max(top, slot.base_from_slot.translation().z() + below);
+  if (has_station()) top = std::max(top, cell_.regrasp->base_from_station.translation().z() + below);
+  if (cell_.bin)
+    for (int i = 0; i < 4; ++i) {
+      const Vec3 half = cell_.bin->inner_size_mm / 2;
+      const Vec3 corner(i & 1 ? half.x() : -half.x(), i & 2 ? half.y() : -half.y(), cell_.bin->inner_size_mm.z());
+      top = std::max(top, (cell_.bin->base_from_bin * corner).z());
+    }
+  return std::min(top + below + kTravelGap_mm, cell_.safety.workspace_mm->max.z());
+}
+
+}  // namespace tribin::picking

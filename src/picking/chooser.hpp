@@ -1,0 +1,58 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tribin/picking/cycle.hpp"
+#include "tribin/picking/place.hpp"
+
+namespace tribin::picking {
+
+/// A grasp and where its part goes.
+struct Choice {
+  grasp::Grasp grasp;
+  grasp::PartHere part;
+  Placing placing;
+};
+
+/// Finds out which grasp leads to a slot.
+class Chooser {
+ public:
+  /// \throws Error bad_input where the cell lacks a rack, a gripper or a robot
+  Chooser(const WorkCell& cell, const robot::RobotModel& robot, Vision& vision, const robot::SafetyLimits& limits);
+
+  const std::vector<Slot>& slots() const { return slots_; }
+  /// The parts that a slot waits for, with all poses in which it may stand in one, or at the station.
+  Places places(const Filling& filling) const;
+  grasp::PlanOptions plan_options(Resort resort, std::vector<grasp::FailedPick> failed) const;
+  bool has_more_grippers() const { return cell_.grippers.size() > 1; }
+
+  /// The best grasp whose part can go into a slot; failing that, one whose part can go to the station.
+  /// \param why  gets what software refuses
+  std::optional<Choice> choose(const grasp::Plan& plan, const Filling& filling, std::vector<std::string>& why) const;
+  /// The first open slot for a part that is held like this.
+  std::optional<Placing> place(const std::string& part, const std::string& gripper, double opening_mm,
+                               const Pose& tcp_from_part, const Filling& filling, bool station) const;
+
+  ArmWithTool arm_with(const std::string& gripper) const;
+  const grasp::GripperShape& shape(const std::string& gripper) const;
+  int tool_of(const std::string& gripper) const;  ///< number on the controller, from 1 in the file's order
+  const CellPart& cell_part(const std::string& name) const;
+  Pose station_pose(const std::string& part) const;
+  bool has_station() const { return cell_.regrasp.has_value(); }
+  /// The TCP's height at which nothing is in the way.
+  double travel_mm() const;
+  /// Reasons of software against the motion, the controller's state aside.
+  std::vector<robot::Refusal> refusals_of(const Choice& choice, double scan_age_s) const;
+
+ private:
+  const WorkCell& cell_;
+  const robot::RobotModel& robot_;
+  Vision& vision_;
+  const robot::SafetyLimits& limits_;
+  std::vector<Slot> slots_;
+  std::vector<grasp::GripperShape> shapes_;
+};
+
+}  // namespace tribin::picking

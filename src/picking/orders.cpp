@@ -1,0 +1,100 @@
+// Commands to the robot: the journal first, then the hand-shake, then the journal again.
+#include <algorithm>
+
+#include "picking/run.hpp"
+#include "tribin/core/error.hpp"
+
+namespace tribin::picking {
+
+Pose Run::here(const std::string& gripper) {
+  if (!base_from_flange_) {
+    const robot::CartesianPosition at = links_.controller->position();
+    const auto& grippers = links_.cell->grippers;
+    const auto tool = static_cast<std::size_t>(std::clamp(at.tool, 1, static_cast<int>(grippers.size())) - 1);
+    base_from_flange_ = robot::pose_of(at) * grippers[tool].flange_from_tcp.inverse();
+  }
+  return *base_from_flange_ * chooser_.shape(gripper).gripper.flange_from_tcp;
+}
+
+robot::CycleResult Run::order(Entry entry, robot::CycleCommand command, const std::vector<Stop>& stops,
+                              const std::string& gripper, double opening_mm, int part_class) {
+  robot::CycleOrder order;
+  order.command = command;
+  order.cycle = entry.cycle = robot::next_cycle(now().last_cycle);
+  order.part_class = part_class;
+  order.opening_mm = opening_mm;
+  const robot::Arm& arm = arm_of(*links_.cell, *links_.robot);
+  for (const Stop& stop : stops)
+    order.positions.push_back(
+        robot::position_from_pose(stop.base_from_tcp, robot::form_bits(arm, stop.joints), chooser_.tool_of(gripper)));
+  report_.cycle = order.cycle;
+  journal_.write(entry);
+  const robot::CycleResult result = robot::run_cycle(*links_.controller, *links_.clock, order, options_.handshake);
+  base_from_flange_ = stops.back().base_from_tcp * chooser_.shape(gripper).gripper.flange_from_tcp.inverse();
+  joints_ = stops.back().joints;
+  note_end(entry, result);
+  return result;
+}
+
+void Run::note_end(const Entry& order, robot::CycleResult result) {
+  Entry end = order;
+  const bool done = result == robot::CycleResult::done;
+  switch (order.event) {
+    case Event::pick_ordered:
+      end.event = done ? Event::picked : Event::missed;
+      break;
+    case Event::place_ordered:
+      end.event = done ? Event::placed : Event::lost;
+      break;
+    default:
+      end.event = Event::moved;
+  }
+  journal_.write(end);
+  if (result == robot::CycleResult::fault)
+    throw Error(ErrorCode::device, "the robot's job ended cycle " + std::to_string(order.cycle) +
+                                       " with a fault; look at its pendant, then start again");
+}
+
+void Run::travel(const Pose& to, const std::string& gripper) {
+  const std::vector<Pose> way =
+      way_between(here(gripper), to, chooser_.travel_mm(), links_.cell->robots.front().way_points);
+  if (way.empty()) return;
+  const auto stops = stops_at(chooser_.arm_with(gripper), way, joints_, false);
+  if (!stops)
+    throw Error(ErrorCode::device,
+                "the way between bin and rack is out of the arm's reach; wanted way points "
+                "(robot.way_points), or a workspace that holds it");
+  Entry entry;
+  entry.event = Event::move_ordered;
+  entry.scene = scene_;
+  order(entry, robot::CycleCommand::way_points, *stops, gripper, 0, 0);
+}
+
+bool Run::carry_out_pick(const Choice& choice, int scene) {
+  const grasp::Grasp& grasp = choice.grasp;
+  std::vector<Stop> stops;
+  const grasp::PathPoint* entry_point = grasp.at(grasp::Step::entry);
+  travel((entry_point ? *entry_point : *grasp.at(grasp::Step::pre_pick)).base_from_tcp, grasp.gripper);
+  if (entry_point) {
+    Entry entry;
+    entry.event = Event::move_ordered;
+    entry.scene = scene;
+    order(entry, robot::CycleCommand::way_points, {{entry_point->base_from_tcp, entry_point->joints}}, grasp.gripper, 0,
+          0);
+  }
+  for (const grasp::Step step : {grasp::Step::pre_pick, grasp::Step::pick, grasp::Step::retreat})
+    stops.push_back({grasp.at(step)->base_from_tcp, grasp.at(step)->joints});
+  Entry entry;
+  entry.event = Event::pick_ordered;
+  entry.scene = scene;
+  entry.part = grasp.part_name, entry.gripper = grasp.gripper, entry.grasp = grasp.family;
+  entry.slot = choice.placing.slot ? choice.placing.slot->number : 0;
+  entry.base_from_part = choice.part.base_from_part;
+  entry.tcp_from_part = grasp.part_from_tcp.inverse();
+  entry.opening_mm = grasp.opening_before_mm;
+  const int part_class = static_cast<int>(&chooser_.cell_part(grasp.part_name) - links_.cell->parts.data()) + 1;
+  return order(entry, robot::CycleCommand::pick, stops, grasp.gripper, grasp.opening_before_mm, part_class) ==
+         robot::CycleResult::done;
+}
+
+}  // namespace tribin::picking

@@ -1,0 +1,63 @@
+#pragma once
+
+#include "picking/chooser.hpp"
+
+namespace tribin::picking {
+
+/// One run of the cycle, from phase to phase.
+class Run {
+ public:
+  Run(const RunLinks& links, const RunOptions& options);
+  RunEnd go();
+
+ private:
+  // The phases; each gives the next one. (recover.cpp and cycle.cpp)
+  Phase recover();
+  Phase scan();
+  Phase choose();
+  Phase pick();
+  Phase place();
+  Phase regrasp();
+  Phase push();
+
+  // recover.cpp
+  bool settle_open_order();
+  void take_answer();
+  Phase in_doubt(const std::string& what);
+
+  // Orders, each in the journal before it is given. (orders.cpp)
+  robot::CycleResult order(Entry entry, robot::CycleCommand command, const std::vector<Stop>& stops,
+                           const std::string& gripper, double opening_mm, int part_class);
+  /// Through way points to where `to` begins. \throws Error device where no way is in reach
+  void travel(const Pose& to, const std::string& gripper);
+  void note_end(const Entry& order, robot::CycleResult result);
+  bool carry_out_pick(const Choice& choice, int scene);
+  Pose here(const std::string& gripper);
+
+  Phase finish(const std::string& status, const std::string& message);
+  Phase next_resort();
+  void tell(const std::string& state, const std::string& note = {});
+  const JournalState& now() const { return journal_.state(); }
+  Filling filling() const { return journal_.state().filling; }
+
+  const RunLinks& links_;
+  const RunOptions& options_;
+  Journal& journal_;
+  Chooser chooser_;
+  Sight sight_;
+  std::optional<Choice> choice_;
+  CycleReport report_;
+  Resort resort_ = Resort::none;
+  int scene_ = 0, pushes_ = 0, failures_ = 0;
+  double scan_s_ = 0;
+  struct Failed {
+    grasp::FailedPick pick;
+    int scene;
+  };
+  std::vector<Failed> failed_;
+  std::optional<Pose> base_from_flange_;  ///< where the arm was sent last
+  std::optional<robot::Joints> joints_;
+  RunEnd end_;
+};
+
+}  // namespace tribin::picking

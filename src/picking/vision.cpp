@@ -1,0 +1,145 @@
+#include "tribin/picking/vision.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "tribin/core/error.hpp"
+#include "tribin/finder/finder.hpp"
+
+namespace tribin::picking {
+namespace {
+
+constexpr int kTurns = 24;  // of a round part: 15 deg, what a jaw's width forgives
+
+class CameraVision : public Vision {
+ public:
+  explicit CameraVision(const VisionParts& from) : from_(from) {
+    for (const CellPart& part : from.cell->parts)
+      known_.push_back(grasp::prepare_grasps(model(part.name), part, from.cell->grippers));
+  }
+
+  Sight scan() override {
+    Shot shot = from_.camera->grab();
+    scan_ = scan_of(std::move(shot), from_.rig).result.scan;
+    const std::optional<std::int64_t> now = from_.any_age ? std::nullopt : std::optional(now_ms());
+    const Pose base_from_input = base_from_camera(*from_.cell, scan_.taken, from_.camera->name(), now);
+    base_from_camera_ = base_from_input * scan_.input_from_camera;
+    found_ = find_parts(scan_, *from_.parts);
+    make_scene();
+    Sight sight;
+    sight.status = found_->status;
+    for (const grasp::PartHere& part : scene_.parts) sight.seen[part.part->part->name] += part.pick;
+    sight.find_ms = found_->times.total();
+    for (const Warning& warning : found_->warnings) sight.warnings.push_back(warning.text);
+    return sight;
+  }
+
+  const Scan* last_scan() const override { return found_ ? &scan_ : nullptr; }
+
+  grasp::Plan plan(const grasp::PlanOptions& options, const Places& places) override {
+    grasp::Scene scene = scene_;
+    add_places(scene, places);
+    return grasp::plan_grasps(scene, options);
+  }
+
+  grasp::PushPlan plan_pushes(const grasp::PlanOptions& options) override {
+    return grasp::plan_pushes(scene_, options);
+  }
+
+  grasp::Plan plan_standing(const std::string& part, const Pose& base_from_part, const grasp::PlanOptions& options,
+                            const Places& places) override {
+    grasp::Scene scene = scene_;
+    scene.scan = nullptr;
+    scene.bin.reset();
+    scene.parts.clear();
+    grasp::PartHere here;
+    here.part = &known(part);
+    here.base_from_part = base_from_part;
+    scene.parts.push_back(here);
+    add_places(scene, places);
+    return grasp::plan_grasps(scene, options);
+  }
+
+  grasp::PartHere part(int index) const override { return scene_.parts.at(static_cast<std::size_t>(index)); }
+
+  const Part& model(const std::string& name) const override {
+    for (const Part& part : *from_.parts)
+      if (part.name == name) return part;
+    throw Error(ErrorCode::bad_input, from_.cell->file.string() + ": saw no [[part]] called " + name + ", wanted one");
+  }
+
+ private:
+  const grasp::GraspPart& known(const std::string& name) const {
+    for (const grasp::GraspPart& part : known_)
+      if (part.part->name == name) return part;
+    throw Error(ErrorCode::bad_input, from_.cell->file.string() + ": saw no [[part]] called " + name + ", wanted one");
+  }
+
+  void make_scene() {
+    scene_ = grasp::scene_of(*from_.cell, scan_, base_from_camera_, found_->instances, known_);
+    if (from_.robot) {
+      grasp::ArmHere arm;
+      arm.robot = from_.robot;
+      arm.arm = &arm_of(*from_.cell, *from_.robot);
+      scene_.arm = arm;
+    }
+    if (!from_.cell->bin) return;
+    // What lies outside of the bin is not for picking: a rim, a wall or a thing beside it.
+    const CellBin& bin = *from_.cell->bin;
+    for (grasp::PartHere& part : scene_.parts) {
+      const Part& model = *part.part->part;
+      const Vec3 at = bin.base_from_bin.inverse() * (part.base_from_part * Vec3((model.box_min + model.box_max) / 2));
+      const bool inside =
+          std::abs(at.x()) < bin.inner_size_mm.x() / 2 && std::abs(at.y()) < bin.inner_size_mm.y() / 2 && at.z() > 0;
+      part.pick = part.pick && inside;
+    }
+  }
+
+  static void add_places(grasp::Scene& scene, const Places& places) {
+    for (grasp::PartHere& part : scene.parts) {
+      const auto at = places.find(part.part->part->name);
+      part.base_from_placed = at == places.end() ? std::vector<Pose>{} : at->second;
+      // A part that no slot takes is in the way, and no more.
+      if (at == places.end()) part.pick = false;
+    }
+  }
+
+  VisionParts from_;
+  std::vector<grasp::GraspPart> known_;
+  Scan scan_;
+  Pose base_from_camera_ = Pose::Identity();
+  std::optional<Found> found_;
+  grasp::Scene scene_;
+};
+
+}  // namespace
+
+std::unique_ptr<Vision> open_vision(const VisionParts& from) { return std::make_unique<CameraVision>(from); }
+
+const robot::Arm& arm_of(const WorkCell& cell, const robot::RobotModel& robot) {
+  const std::string& name = cell.robots.front().arm;
+  return name.empty() ? robot.arms.front() : robot::arm_called(robot, name);
+}
+
+std::vector<Pose> alike(const Part& part, const Pose& pose) {
+  std::vector<Pose> out;
+  const auto add = [&](const Pose& turn) {
+    for (const Pose& same : part.symmetry.discrete) out.push_back(pose * turn * same);
+    if (part.symmetry.discrete.empty()) out.push_back(pose * turn);
+  };
+  if (part.symmetry.continuous.empty()) {
+    add(Pose::Identity());
+    return out;
+  }
+  const ContinuousSymmetry& axis = part.symmetry.continuous.front();
+  for (int k = 0; k < kTurns; ++k) {
+    Pose turn = Pose::Identity();
+    turn.linear() = rotation_from_vector(2 * kPi * k / kTurns * axis.axis);
+    turn.translation() = axis.point - turn.linear() * axis.point;
+    add(turn);
+  }
+  return out;
+}
+
+}  // namespace tribin::picking

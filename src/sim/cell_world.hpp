@@ -1,0 +1,88 @@
+#pragma once
+
+#include <map>
+#include <optional>
+#include <set>
+#include <vector>
+
+#include "sim/cell_errors.hpp"
+#include "sim/live_heap.hpp"
+#include "sim/random.hpp"
+#include "tribin/grasp/gripper_shape.hpp"
+#include "tribin/picking/rack.hpp"
+#include "tribin/sim/work_cell.hpp"
+
+namespace tribin::sim {
+
+/// What happens in the cell while the controller moves the arm: the heap, the gripper, what it holds and what it
+/// touches. Base frame, unless a name says otherwise.
+class CellWorld {
+ public:
+  CellWorld(const WorkCell& cell, const robot::RobotModel& robot, const CellStock& stock,
+            const SimulatedCellOptions& options);
+
+  /// The arm has come here, at this time. Steps the physics up to it.
+  void follow(const controller_sim::Machine& machine);
+  /// The gripper closes, or its vacuum is switched on. \return whether it holds something
+  bool close(const controller_sim::Machine& machine);
+  void open(const controller_sim::Machine& machine);
+  /// Nothing in the heap moves.
+  bool at_rest() const { return heap_->at_rest(); }
+  bool reachable(const Pose& base_from_tcp, int tool) const;
+
+  const CellTruth& truth();
+  /// Parts that stand or lie somewhere, not in the hand.
+  struct Standing {
+    int part_class;
+    Pose base_from_part;
+  };
+  std::vector<Standing> standing() const;
+  const Pose& base_from_camera() const { return base_from_camera_; }  ///< the true one
+  void note_scan();
+
+ private:
+  struct Tool {
+    grasp::GripperShape shape;
+    std::vector<Mesh> meshes;
+    std::vector<Solid> solids;
+    std::vector<int> bodies;  ///< in the heap
+    double opening_mm = 0;
+  };
+
+  void drop_parts(const SimulatedCellOptions& options);
+  void add_tools(const WorkCell& cell);
+  Pose true_tcp(const controller_sim::Machine& machine) const;
+  Tool& tool_of(const controller_sim::Machine& machine);
+  void place_bodies(Tool& tool);
+  void find_contacts(const Tool& tool, const controller_sim::Machine& machine);
+  void find_arm_contacts(int tool, const controller_sim::Machine& machine);
+  void note(const std::string& what, double depth_mm, const controller_sim::Machine& machine);
+  void note_placed(int part, int slot, const Pose& base_from_wanted);
+  bool in_push(const controller_sim::Machine& machine) const;
+
+  const WorkCell& cell_;
+  const robot::RobotModel& robot_;
+  const robot::Arm& arm_;
+  const CellStock& stock_;
+  SimulatedCellOptions options_;
+  Random random_;
+  RobotField field_;
+  Pose base_from_bin_, base_from_camera_;
+  std::vector<picking::Slot> slots_;
+  std::vector<Mesh> own_;
+  std::vector<int> class_of_;
+  std::unique_ptr<LiveHeap> heap_;
+  std::vector<Tool> tools_;
+  Pose base_from_tcp_ = Pose::Identity();
+  std::optional<robot::Joints> joints_;
+  int held_ = -1;
+  Pose tcp_from_held_ = Pose::Identity();
+  int active_ = -1, cycle_ = 0;
+  double physics_s_ = 0;
+  Vec3 looked_at_ = Vec3::Constant(1e9), arm_looked_at_ = Vec3::Constant(1e9);
+  std::set<std::pair<int, std::string>> noted_;
+  std::vector<Pose> at_scan_;
+  CellTruth truth_;
+};
+
+}  // namespace tribin::sim

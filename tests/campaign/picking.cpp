@@ -1,0 +1,181 @@
+// Simulated cells from full bin to full rack: what is placed, how, and what is left.
+// usage: campaign_picking [BINS] [SEED] [--workcell FILE] [--parts N] [-v]
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <map>
+
+#include "tribin/config/robot_file.hpp"
+#include "tribin/io/cad_files.hpp"
+#include "tribin/io/part_cache.hpp"
+#include "tribin/picking/cycle.hpp"
+#include "tribin/robot/cell_limits.hpp"
+#include "tribin/sim/work_cell.hpp"
+
+namespace {
+
+using namespace tribin;
+
+struct Totals {
+  int bins = 0, parts = 0, placed = 0, placed_without_help = 0, picks = 0, missed = 0, lost = 0, put_down = 0,
+      pushes = 0;
+  int collisions = 0, wrong = 0, twice = 0, disturbed = 0;
+  std::map<std::string, int> ends, refused, left, grip_failures, touched;
+  std::vector<double> off_mm, off_deg, find_ms, plan_ms, cycle_s;
+};
+
+double quantile(std::vector<double> values, double share) {
+  if (values.empty()) return 0;
+  std::sort(values.begin(), values.end());
+  return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1) + 0.5)];
+}
+
+void judge(const WorkCell& cell, const sim::CellTruth& truth, const picking::Filling& filling, Totals& totals) {
+  const std::vector<picking::Slot> slots = picking::slots_of(*cell.rack);
+  std::vector<int> stands(slots.size());
+  for (const sim::PartTruth& part : truth.parts) {
+    ++totals.parts;
+    totals.twice += part.times_placed > 1;
+    if (part.where == sim::Whereabouts::placed) {
+      ++totals.placed;
+      const auto slot = static_cast<std::size_t>(part.slot) - 1;
+      totals.wrong += !may_stand(slots[slot], part.part) || filling[slot] != part.part || ++stands[slot] > 1;
+      totals.off_mm.push_back(part.off_mm);
+      totals.off_deg.push_back(part.off_rad / kDegree);
+    } else {
+      constexpr const char* kWhere[] = {"in the bin", "in the hand", "placed", "at the station", "lost"};
+      ++totals.left[part.part + " " + kWhere[static_cast<int>(part.where)]];
+    }
+  }
+  for (std::size_t i = 0; i < slots.size(); ++i) totals.wrong += !filling[i].empty() && stands[i] == 0;
+  totals.collisions += static_cast<int>(truth.collisions.size());
+  totals.disturbed += truth.disturbed;
+  for (const std::string& why : truth.failed_grips) ++totals.grip_failures[why];
+}
+
+void print(const char* name, const std::map<std::string, int>& counts) {
+  std::printf("%s:", name);
+  for (const auto& [what, count] : counts) std::printf(" %s %d;", what.c_str(), count);
+  std::printf("\n");
+}
+
+}  // namespace
+
+int main(int argc, char** argv) try {
+  int bins = 50, parts_in_bin = 15, numbers = 0;
+  std::uint64_t seed = 1;
+  bool verbose = false;
+  std::string file = std::string(TRIBIN_SOURCE_DIR) + "/examples/cells/pick_cell.toml";
+  for (int i = 1; i < argc; ++i)
+    if (std::strcmp(argv[i], "--workcell") == 0 && i + 1 < argc)
+      file = argv[++i];
+    else if (std::strcmp(argv[i], "--parts") == 0 && i + 1 < argc)
+      parts_in_bin = std::atoi(argv[++i]);
+    else if (std::strcmp(argv[i], "-v") == 0)
+      verbose = true;
+    else if (numbers++ == 0)
+      bins = std::atoi(argv[i]);
+    else
+      seed = std::strtoull(argv[i], nullptr, 10);
+  const WorkCell cell = read_work_cell(file);
+  const robot::RobotModel robot = read_robot(cell.robots.at(0).model);
+  std::vector<Part> parts;
+  std::vector<Mesh> meshes;
+  for (const CellPart& part : cell.parts) {
+    PartReadOptions options;
+    options.name = part.name;
+    options.cad.unit = length_unit_from_name(part.unit);
+    options.cache = part_cache_folder();
+    parts.push_back(read_part(part.cad, options));
+    meshes.push_back(parts.back().mesh);
+  }
+  const auto stock = sim::make_cell_stock(meshes);
+  Totals totals;
+  for (int bin = 0; bin < bins; ++bin) {
+    sim::SimulatedCellOptions options;
+    options.seed = seed + static_cast<std::uint64_t>(bin);
+    options.parts = parts_in_bin;
+    sim::SimulatedCell simulated(cell, robot, stock, options);
+    const auto vision = picking::open_vision({&cell, &parts, &simulated.camera(), &robot});
+    const std::filesystem::path journal_file =
+        std::filesystem::temp_directory_path() / ("tribin_picking_" + std::to_string(::getpid()) + ".ndjson");
+    std::filesystem::remove(journal_file);
+    picking::Journal journal(journal_file, picking::slots_of(*cell.rack).size());
+    robot::SafetyLimits limits = robot::limits_of(cell);
+    for (std::size_t i = 0; i < cell.grippers.size(); ++i) limits.tools.insert(static_cast<int>(i) + 1);
+    const auto controller = robot::make_guarded(simulated.connect(), limits, true);
+    int without_help = 0;
+    std::map<std::string, bool> helped;
+    picking::RunOptions run;
+    run.arm = true;
+    run.told = [&](const picking::CycleReport& report) {
+      totals.missed += report.state == "missed";
+      totals.lost += report.state == "lost";
+      totals.put_down += report.state == "put_down";
+      totals.pushes += report.state == "pushed";
+      if (report.state == "placed") {
+        without_help += report.resort == picking::Resort::none;
+        totals.cycle_s.push_back(report.robot_s);
+      }
+      if (report.find_ms > 0) totals.find_ms.push_back(report.find_ms);
+      totals.plan_ms.push_back(report.plan_ms);
+      for (const auto& reason : report.refused) totals.refused[std::string(name_of(reason.why))] += reason.count;
+      if (verbose)
+        std::printf("    scene %d %s %s %s (%s) slot %d resort %s score %.3f find %.0f ms plan %.0f ms %.1f s %s\n",
+                    report.scene, report.state.c_str(), report.part.c_str(), report.grasp.c_str(),
+                    report.gripper.c_str(), report.slot, std::string(name_of(report.resort)).c_str(), report.score,
+                    report.find_ms, report.plan_ms, report.robot_s, report.note.c_str());
+      std::fflush(stdout);
+    };
+    picking::RunEnd end;
+    try {
+      end = picking::run_picking({&cell, &robot, vision.get(), controller.get(), &simulated.clock(), &journal, limits},
+                                 run);
+    } catch (const Error& error) {
+      end.status = "error";
+      end.message = error.what();
+    }
+    const sim::CellTruth& truth = simulated.truth();
+    ++totals.bins;
+    ++totals.ends[end.status];
+    totals.placed_without_help += without_help;
+    totals.picks += truth.grips;
+    judge(cell, truth, journal.state().filling, totals);
+    int placed = 0;
+    for (const sim::PartTruth& part : truth.parts) placed += part.where == sim::Whereabouts::placed;
+    std::printf("bin %d (seed %llu): %d of %zu placed, %d grips, %zu collisions, %.0f s; %s: %s\n", bin + 1,
+                static_cast<unsigned long long>(options.seed), placed, truth.parts.size(), truth.grips,
+                truth.collisions.size(), truth.simulated_s, end.status.c_str(), end.message.c_str());
+    if (verbose)
+      for (const sim::CellCollision& c : truth.collisions)
+        std::printf("    collision at %.1f s, cycle %d: %s, %.2f mm\n", c.time_s, c.cycle, c.what.c_str(), c.depth_mm);
+    std::fflush(stdout);
+    std::filesystem::remove(journal_file);
+  }
+  std::printf("%d bins, %d parts: placed %d (%.1f %%), without help %d (%.1f %%); %.2f grips a placed part\n",
+              totals.bins, totals.parts, totals.placed, 100.0 * totals.placed / std::max(1, totals.parts),
+              totals.placed_without_help, 100.0 * totals.placed_without_help / std::max(1, totals.parts),
+              static_cast<double>(totals.picks) / std::max(1, totals.placed));
+  std::printf("missed %d, lost %d, gripped anew %d, pushes %d, disturbed %d\n", totals.missed, totals.lost,
+              totals.put_down, totals.pushes, totals.disturbed);
+  std::printf("collisions %d, wrong class or slot %d, placed twice %d\n", totals.collisions, totals.wrong,
+              totals.twice);
+  std::printf("placed off: median %.2f mm %.2f deg, 95 %% %.2f mm %.2f deg\n", quantile(totals.off_mm, 0.5),
+              quantile(totals.off_deg, 0.5), quantile(totals.off_mm, 0.95), quantile(totals.off_deg, 0.95));
+  std::printf("vision: find median %.0f ms, 95 %% %.0f ms; grasps median %.0f ms, 95 %% %.0f ms (this machine)\n",
+              quantile(totals.find_ms, 0.5), quantile(totals.find_ms, 0.95), quantile(totals.plan_ms, 0.5),
+              quantile(totals.plan_ms, 0.95));
+  std::printf("cycle: median %.1f s, 95 %% %.1f s\n", quantile(totals.cycle_s, 0.5), quantile(totals.cycle_s, 0.95));
+  print("ends", totals.ends);
+  print("left", totals.left);
+  print("grips that held nothing", totals.grip_failures);
+  print("refused grasps", totals.refused);
+  return totals.collisions == 0 && totals.wrong == 0 && totals.twice == 0 ? 0 : 1;
+} catch (const std::exception& error) {
+  std::fprintf(stderr, "campaign_picking: %s\n", error.what());
+  return 70;
+}
