@@ -5,6 +5,7 @@
 #include <cmath>
 #include <vector>
 
+#include "outline_side.hpp"
 #include "raster.hpp"
 
 namespace tribin {
@@ -62,6 +63,8 @@ ContourSums contour_sums(const RenderMesh& mesh, const SceneDepth& scene, const 
   const PinholeCamera& camera = scene.camera;
   const Eigen::Matrix3d rotation = camera_from_part.linear();
   const double inverse_step = 1.0 / render.step;
+  // A shade is as wide as what throws it is high.
+  const int across = std::max(render.width, render.height) * render.step / 2;
   double squares = 0, weights = 0;
   Eigen::Matrix<double, 6, 6> h = Eigen::Matrix<double, 6, 6>::Zero();
   Eigen::Matrix<double, 6, 1> b = Eigen::Matrix<double, 6, 1>::Zero();
@@ -123,6 +126,11 @@ ContourSums contour_sums(const RenderMesh& mesh, const SceneDepth& scene, const 
       if (rendered(margin, outside) && 1 / outside - z < 0.01 * z) continue;
       const double s = edge_along(scene, q[0], q[1], m, n, rho, reach_px);
       if (!(std::abs(s) <= reach_px)) continue;
+      // The edge of something in front is not the part's.
+      const Vec2 edge_at = q + m * (s + 0.5);
+      const double tolerance = 6 * scene.median_sigma_mm + z / camera.fx;
+      if (look_beside(scene, edge_at[0], edge_at[1], m[0], m[1], 1, 2, across, {n, rho, z}, tolerance) != Beside::ends)
+        continue;
       const Eigen::Vector3d point = Eigen::Vector3d(camera.point(q[0], q[1], z));
       const Eigen::Vector3d g(m[0] * camera.fx * w, m[1] * camera.fy * w,
                               -(m[0] * camera.fx * point.x() + m[1] * camera.fy * point.y()) * w * w);

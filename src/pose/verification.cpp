@@ -1,27 +1,17 @@
 #include "tribin/pose/verification.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+
+#include "outline_side.hpp"
 
 namespace tribin {
 namespace {
 
-// Outside of the outline the scan is looked at two rendered pixels away, beside the mixed pixels of the edge; where
-// nothing is measured, up to three more, across the pits of a surface that is measured here and there.
+// Outside of the outline the scan is looked at two rendered pixels away, beside the mixed pixels of the edge; the
+// surface may still go on three farther, across the pits of one that is measured here and there.
 constexpr int kOutside = 2, kFarthest = 5;
-
-enum class Beside { goes_on, ends, jumps };
-
-/// Does the scene end or jump at full-image pixel (u, v), seen from a facet (normal n, n . x = rho) at depth z?
-Beside beside(const SceneDepth& scene, int u, int v, const Vec3f& n, double rho, double z, double plane_tolerance,
-              double depth_tolerance) {
-  if (!scene.z_mm.contains(u, v)) return Beside::goes_on;  // the image's border proves nothing
-  const float z_out = scene.z_mm(u, v);
-  if (!(z_out > 0)) return Beside::ends;
-  if (std::abs(z_out - z) > depth_tolerance) return Beside::jumps;
-  const Vec3 p = scene.camera.point(u, v, z_out);
-  return std::abs(n.cast<double>().dot(p) - rho) > plane_tolerance ? Beside::jumps : Beside::goes_on;
-}
 
 }  // namespace
 
@@ -39,6 +29,8 @@ Verification verify_pose(const RenderMesh& mesh, const SceneDepth& scene, const 
   const PinholeCamera& camera = scene.camera;
   const double near_mm = 0.03 * options.diameter_mm;  // nearer than this an occluder would touch: it is a misfit
   const double pitch_factor = options.step_px / camera.fx;
+  // A shade is as wide as what throws it is high: up to half of what is rendered is looked across.
+  const int across = std::max(kFarthest, std::max(render.width, render.height) / 2);
   double gain = 0, squares = 0;
   for (int j = 0; j < render.height; ++j) {
     const int v = render.v0 + j * render.step;
@@ -80,24 +72,17 @@ Verification verify_pose(const RenderMesh& mesh, const SceneDepth& scene, const 
       }
       // A supported pixel beside the outline: does the scene end there too?
       const double plane_tolerance = std::max(6 * sigma, z_model * pitch_factor);
-      const double depth_tolerance = std::max(10 * sigma, near_mm);
-      const double rho = along * z_model;
+      const OutlineFacet facet{n.cast<double>(), along * z_model, z_model};
       constexpr std::array<std::array<int, 2>, 4> kSides = {{{-1, 0}, {1, 0}, {0, -1}, {0, 1}}};
       for (const auto& d : kSides) {
         const int ii = i + d[0], jj = j + d[1];
         const bool outside =
             ii < 0 || jj < 0 || ii >= render.width || jj >= render.height || render.triangle[render.index(ii, jj)] < 0;
         if (!outside) continue;
-        ++out.outline;
-        Beside seen = Beside::ends;
-        for (int far = kOutside; far <= kFarthest && seen == Beside::ends; ++far) {
-          const Beside there = beside(scene, u + d[0] * far * render.step, v + d[1] * far * render.step, n, rho,
-                                      z_model, plane_tolerance, depth_tolerance);
-          // Farther away another surface proves nothing, but this one, going on, does.
-          if (far == kOutside || there == Beside::goes_on) seen = there;
-        }
-        out.outline_breaks += seen != Beside::goes_on;
-        out.outline_jumps += seen == Beside::jumps;
+        const Beside beside = look_beside(scene, u, v, d[0] * render.step, d[1] * render.step, kOutside, kFarthest,
+                                          across, facet, plane_tolerance);
+        out.outline += beside != Beside::hidden;
+        out.outline_breaks += beside == Beside::ends;
       }
     }
   }

@@ -22,9 +22,8 @@ struct Verification {
   int occluded = 0;   ///< something lies in front
   int no_data = 0;
   double gain = 0;         ///< summed evidence in pixels of the full image: at most one a pixel
-  int outline = 0;         ///< supported outline pixels
-  int outline_breaks = 0;  ///< of those, where the scene really ends or jumps beside the outline
-  int outline_jumps = 0;   ///< of those breaks, where the scene beside is measured: elsewhere than the surface goes on
+  int outline = 0;         ///< supported outline pixels beside which the scan tells: nothing nearer hides it
+  int outline_breaks = 0;  ///< of those, where the surface ends there: what is seen beside it lies farther away
   double rms_sigma = 0;    ///< of the supported residuals, in local sigma
 
   double visible_fraction() const { return pixels ? double(pixels - occluded) / pixels : 0; }
