@@ -49,7 +49,8 @@ enum class Source { primitives, point_pairs };
 std::vector<PoseCandidate> find_candidates(const SceneFeatures& features, SceneDepth& scene, const Part& part,
                                            int part_index, Source source, std::vector<Reason>& rejected);
 
-/// Do two poses of one part mean the same placing, up to the look-up's coarse steps?
+/// Do two poses of one part mean the same placing, its symmetries aside?
+/// \param distance_mm, angle  how far the centre of its box may be off, and how far it may be turned.
 bool close_poses(const Part& part, const Pose& a, const Pose& b, double distance_mm, double angle);
 
 }  // namespace tribin

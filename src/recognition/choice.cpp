@@ -9,6 +9,7 @@
 #include "likelihood.hpp"
 #include "render_scores.hpp"
 #include "tribin/core/parallel.hpp"
+#include "tribin/pose/index_render.hpp"
 #include "tribin/pose/look_up.hpp"
 
 namespace tribin {
@@ -34,7 +35,7 @@ Pose turned(const Pose& pose, const ContinuousSymmetry& line, double angle) {
 /// the right spin behind the eighth in 15 % of the cases, renders in 2 %.)
 void add_spins(const SceneDepth& scene, const Part& part, const Pose& pose, std::vector<Pose>& out) {
   constexpr int kSpins = 120;  // 3 deg: a hole of 5 % of the diameter at its rim
-  constexpr std::size_t kBest = 8, kMost = 12;
+  constexpr std::size_t kBest = 8, kMost = 24;
   constexpr std::size_t kLooked = 24;  // maxima on few pixels that are looked at again on more
   const int few = step_for(part, scene, pose, kCompareFew), step = step_for(part, scene, pose, kPolishPixels);
   for (const ContinuousSymmetry& axis : part.nearly_round) {
@@ -69,6 +70,40 @@ void add_spins(const SceneDepth& scene, const Part& part, const Pose& pose, std:
   }
 }
 
+/// Half turns about the faces that most of what is seen belongs to: about the middle of a plane, end for end of a
+/// cylinder. They bring a face onto itself, or nearly, and what would tell may be hidden.
+void add_half_turns(const SceneDepth& scene, const Part& part, const Pose& pose, std::vector<Pose>& out) {
+  IndexRender render;
+  const int step = step_for(part, scene, pose, kCompareFew);
+  render_index(part.render_mesh, scene.camera, pose, step, render);
+  std::vector<int> pixels(part.model.primitives.size() + 1, 0);
+  int all = 0;
+  for (int j = 0; j < render.height; ++j)
+    for (int i = 0; i < render.width; ++i) {
+      const std::size_t k = render.index(i, j);
+      if (render.triangle[k] < 0) continue;
+      const int u = render.u0 + i * step, v = render.v0 + j * step;
+      const float z = scene.z_mm(u, v);
+      if (!(std::abs(z - 1 / render.inverse_z[k]) < 0.02 * part.diameter_mm + 5 * scene.sigma_mm(u, v))) continue;
+      ++pixels[static_cast<std::size_t>(part.primitive_of_triangle[static_cast<std::size_t>(render.triangle[k])])];
+      ++all;
+    }
+  for (const Primitive& p : part.model.primitives) {
+    if (4 * pixels[static_cast<std::size_t>(p.id)] < all) continue;
+    ContinuousSymmetry line;
+    line.axis = p.axis;
+    line.point = p.point;
+    if (p.type == PrimitiveType::cylinder) {
+      line.point = p.point + p.axis * (0.5 * (p.extent_min + p.extent_max));
+      const Eigen::Vector3d eye = pose.inverse() * Eigen::Vector3d(0, 0, 0) - Eigen::Vector3d(line.point);
+      line.axis = Vec3(eye - Eigen::Vector3d(p.axis) * eye.dot(Eigen::Vector3d(p.axis)));
+    } else if (p.type != PrimitiveType::plane) {
+      continue;
+    }
+    out.push_back(turned(pose, line, kPi));
+  }
+}
+
 /// Poses that the part's own shape confuses with this one.
 std::vector<Pose> rivals(const SceneDepth& scene, const Part& part, const Pose& pose) {
   std::vector<Pose> out;
@@ -82,6 +117,7 @@ std::vector<Pose> rivals(const SceneDepth& scene, const Part& part, const Pose& 
   for (const SelfSimilarPose& s : part.self_similar)
     if (const Pose other = pose * s.part_from_part; score(other) > own - 0.3) out.push_back(other);
   add_spins(scene, part, pose, out);
+  add_half_turns(scene, part, pose, out);
   return out;
 }
 
@@ -192,7 +228,8 @@ bool keeps_limits(const Part& part, const PoseCandidate& candidate, double slack
   return true;
 }
 
-Polished polish_once(const SceneDepth& scene, std::span<const Part> parts, const PoseCandidate& settled) {
+Polished polish_once(const SceneDepth& scene, std::span<const Part> parts, const PoseCandidate& settled,
+                     std::span<const Pose> also) {
   const Part& part = parts[static_cast<std::size_t>(settled.part)];
   const double noise = 4 * scene.median_sigma_mm;
   const int few = step_for(part, scene, settled.camera_from_part, kCompareFew);
@@ -201,6 +238,7 @@ Polished polish_once(const SceneDepth& scene, std::span<const Part> parts, const
   // poses that differ in small features only: it needs a place that is right to the noise.
   std::vector<Pose> poses = rivals(scene, part, settled.camera_from_part);
   add_weakest_moves(part, settled, poses);
+  poses.insert(poses.end(), also.begin(), also.end());
   poses.insert(poses.begin(), settled.camera_from_part);
   std::vector<Verification> checks(poses.size());
   parallel_each(static_cast<int>(poses.size()), [&](int i) {
@@ -239,7 +277,7 @@ Polished polish_once(const SceneDepth& scene, std::span<const Part> parts, const
         }))
       keep.push_back(k);
   }
-  if (keep.size() > 16) keep.resize(16);
+  if (keep.size() > 32) keep.resize(32);
   std::vector<Finalist> finalists;
   std::vector<std::pair<const Part*, Pose>> kept;
   for (const std::size_t k : keep) {
@@ -272,17 +310,22 @@ Polished polish_once(const SceneDepth& scene, std::span<const Part> parts, const
   out.candidate.verification = verify_pose(part.render_mesh, scene, finalists[0].pose,
                                            verification_options(part, fine, 0.002 * part.diameter_mm));
   out.mask = mask_of(part, scene, out.candidate);
+  const auto same = [&](const Pose& a, const Pose& b) {
+    return close_poses(part, a, b, 0.02 * part.diameter_mm, 4 * kDegree);
+  };
   for (const Finalist& f : finalists)
-    if (!close_poses(part, f.pose, finalists[0].pose, 0.02 * part.diameter_mm, 4 * kDegree))
+    if (!same(f.pose, finalists[0].pose) &&
+        std::none_of(out.others.begin(), out.others.end(), [&](const auto& o) { return same(o.first, f.pose); }))
       out.others.emplace_back(f.pose, f.log_likelihood);
   return out;
 }
 
 }  // namespace
 
-Polished polish(const SceneDepth& scene, std::span<const Part> parts, const PoseCandidate& settled) {
+Polished polish(const SceneDepth& scene, std::span<const Part> parts, const PoseCandidate& settled,
+                std::span<const Pose> also) {
   const Part& part = parts[static_cast<std::size_t>(settled.part)];
-  Polished out = polish_once(scene, parts, settled);
+  Polished out = polish_once(scene, parts, settled, also);
   // Upside down and turned: a pose that has changed is taken for others than the one it came from.
   constexpr int kMore = 2;
   PoseCandidate from = settled;
@@ -294,7 +337,7 @@ Polished polish(const SceneDepth& scene, std::span<const Part> parts, const Pose
         std::any_of(out.others.begin(), out.others.end(), [&](const auto& other) { return same(other.first); }))
       break;
     from = out.candidate;
-    out = polish_once(scene, parts, from);
+    out = polish_once(scene, parts, from, also);
   }
   return out;
 }

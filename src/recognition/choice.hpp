@@ -29,7 +29,10 @@ PoseCandidate settled_on_scan(const SceneDepth& scene, const Part& part, const P
 bool plausible(const Part& part, const PoseCandidate& settled, std::vector<Reason>& rejected);
 
 /// \param settled  from settled_on_scan.
-Polished polish(const SceneDepth& scene, std::span<const Part> parts, const PoseCandidate& settled);
+/// \param also     poses that the search found in the same place: where little of a part is seen, they may explain it
+///                 as well.
+Polished polish(const SceneDepth& scene, std::span<const Part> parts, const PoseCandidate& settled,
+                std::span<const Pose> also);
 
 /// Share of the silhouette that must be measured, on surfaces that are not too large for the part: less than a fifth is
 /// not a look at it, any face of its size would do.

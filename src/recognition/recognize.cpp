@@ -193,15 +193,18 @@ std::vector<Polished> choose(const SceneFeatures& features, const SceneDepth& sc
                             place_of(part, candidates[i])});
       continue;
     }
-    // The rivals for this place: the best two of each part that are not far behind.
+    // The rivals for this place: the best two of each part that are not far behind, and as many more poses as the
+    // polish can look at.
+    constexpr int kLookedAt = 6;
     std::vector<std::size_t> rivals;
     std::vector<int> taken(parts.size(), 0);
+    std::vector<std::vector<Pose>> also(parts.size());  // what else was found here, of each part
     for (std::size_t k = i; k < candidates.size(); ++k) {
       if (done[k] || candidates[k].verification.gain < 0.8 * candidates[i].verification.gain) continue;
-      int& n = taken[static_cast<std::size_t>(candidates[k].part)];
-      if (n >= 2 || (k != i && overlap(masks[i], masks[k]) < 0.5)) continue;
-      ++n;
-      rivals.push_back(k);
+      const auto of = static_cast<std::size_t>(candidates[k].part);
+      if (taken[of] >= kLookedAt || (k != i && overlap(masks[i], masks[k]) < 0.5)) continue;
+      if (++taken[of] > 1) also[of].push_back(candidates[k].camera_from_part);
+      if (taken[of] <= 2) rivals.push_back(k);
     }
     for (const std::size_t k : rivals) done[k] = true;
     std::erase_if(rivals, [&](std::size_t k) {
@@ -221,7 +224,7 @@ std::vector<Polished> choose(const SceneFeatures& features, const SceneDepth& sc
           std::any_of(polished.begin(), polished.end(), [&](const Polished& p) { return p.candidate.part == c.part; });
       if (plausible(parts[static_cast<std::size_t>(c.part)], c, rejected)) {
         // Of one part, the polish itself tries the poses that are mistaken for each other.
-        if (!twin) polished.push_back(polish(scene, parts, c));
+        if (!twin) polished.push_back(polish(scene, parts, c, also[static_cast<std::size_t>(c.part)]));
       } else {
         refused.candidates.push_back(candidates[rivals[r]]);
       }
