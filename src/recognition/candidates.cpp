@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "render_scores.hpp"
 #include "tribin/core/parallel.hpp"
 #include "tribin/pose/look_up.hpp"
 
@@ -164,15 +165,15 @@ RefineOptions refine_options(const Part& part, int step_px, int iterations, doub
 
 Refinement refine_guarded(const Part& part, const SceneDepth& scene, const Pose& start, const RefineOptions& options) {
   Refinement refined = refine_pose(part.render_mesh, scene, start, options);
-  const double tolerance = 0.002 * part.diameter_mm;
-  // A shorter way than the verification's tolerance cannot change its score.
-  if (close_poses(part, start, refined.camera_from_part, tolerance, tolerance / part.gyration_mm)) return refined;
-  const auto gain = [&](const Pose& pose) {
-    return verify_pose(part.render_mesh, scene, pose, verification_options(part, options.step_px, tolerance)).gain;
-  };
-  // 2 % is what noise and the raster move a score by between two poses that are both right (measured on heaps of gear
-  // motors).
-  if (gain(refined.camera_from_part) >= 0.98 * gain(start)) return refined;
+  // What moves no pixel's facet by its noise changes no score.
+  if (close_poses(part, start, refined.camera_from_part, 0.3 * scene.median_sigma_mm,
+                  0.3 * scene.median_sigma_mm / part.gyration_mm))
+    return refined;
+  // A few nats are what the raster makes of two poses that are both right.
+  constexpr double kRaster = 3;
+  const std::array<Pose, 2> poses = {start, refined.camera_from_part};
+  const std::vector<double> score = render_scores(scene, part, poses, options.step_px);
+  if (score[1] > score[0] - kRaster) return refined;
   RefineOptions stay = options;
   stay.iterations = 0;
   return refine_pose(part.render_mesh, scene, start, stay);

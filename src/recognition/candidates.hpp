@@ -37,8 +37,8 @@ RefineOptions refine_options(const Part& part, int step_px, int iterations, doub
 /// diameter, a fifth of what counts as found. Refinement leaves it alone and the answer tells of it.
 inline double weak_limit_mm(const Part& part) { return 0.01 * part.diameter_mm; }
 
-/// refine_pose, taken back where the refined pose explains the scan worse than its start: the next slot or step of a
-/// part draws weakly held poses off.
+/// refine_pose, taken back where the scan is less likely at the refined pose than at its start: normals alone let a
+/// part slide along its weak directions, past steps that only its depth shows.
 Refinement refine_guarded(const Part& part, const SceneDepth& scene, const Pose& start, const RefineOptions& options);
 
 /// Where hypotheses come from, cheapest and surest first.
