@@ -342,6 +342,24 @@ Polished polish(const SceneDepth& scene, std::span<const Part> parts, const Pose
   return out;
 }
 
+void decide_again(const SceneDepth& scene, std::span<const Part> parts, const CellMask& elsewhere, Polished& polished) {
+  if (polished.others.empty()) return;
+  const Part& part = parts[static_cast<std::size_t>(polished.candidate.part)];
+  std::vector<std::pair<const Part*, Pose>> poses = {{&part, polished.candidate.camera_from_part}};
+  for (const auto& [pose, log_odds] : polished.others) poses.emplace_back(&part, pose);
+  const Ranking ranking = rank_again(scene, poses, step_for(part, scene, poses[0].second, kDecidePixels), elsewhere);
+  polished.others.clear();
+  for (std::size_t i = 1; i < ranking.order.size(); ++i)
+    polished.others.emplace_back(poses[ranking.order[i]].second, ranking.log_odds[i]);
+  if (ranking.order[0] == 0) return;
+  PoseCandidate& c = polished.candidate;
+  c.camera_from_part = poses[ranking.order[0]].second;
+  c.verification = verify_pose(
+      part.render_mesh, scene, c.camera_from_part,
+      verification_options(part, step_for(part, scene, c.camera_from_part, kPolishPixels), 0.002 * part.diameter_mm));
+  polished.mask = mask_of(part, scene, c);
+}
+
 bool hopeful(const Part& part, const PoseCandidate& candidate, std::vector<Reason>& rejected) {
   // A thousand pixels and a pose a little off tell less: twice what `plausible` leaves open, and the outline's few
   // samples two standard deviations besides. Spares a third of the fits on a dense heap and changes no answer there.

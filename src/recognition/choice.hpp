@@ -34,6 +34,11 @@ bool plausible(const Part& part, const PoseCandidate& settled, std::vector<Reaso
 Polished polish(const SceneDepth& scene, std::span<const Part> parts, const PoseCandidate& settled,
                 std::span<const Pose> also);
 
+/// A polished pose against its self-similar ones once more, when it is known what other parts explain: what one of them
+/// hides or shows tells nothing. The first pose may change.
+/// \param elsewhere  cells that the others explain.
+void decide_again(const SceneDepth& scene, std::span<const Part> parts, const CellMask& elsewhere, Polished& polished);
+
 /// Share of the silhouette that must be measured, on surfaces that are not too large for the part: less than a fifth is
 /// not a look at it, any face of its size would do.
 inline constexpr double kLeastMeasured = 0.2;

@@ -100,9 +100,14 @@ std::vector<double> log_likelihoods(const SceneDepth& scene, std::span<const std
 }
 
 std::vector<double> log_odds(const SceneDepth& scene, std::span<const std::pair<const Part*, Pose>> poses,
-                             int step_px) {
-  constexpr int kPatch = 8;            // rendered pixels: some hundred patches a part
-  constexpr double kMostOfPatch = 30;  // nats; a patch of mirrored light is one vote, not the election
+                             int step_px, const CellMask& elsewhere) {
+  // Votes are counted by patches of the image: mirrored light, a burr, an edge a fraction of a pixel off move whole
+  // patches, of either sign. So a patch counts at most 8 nats, and the sum counts beyond 1.5 sd of what the same votes
+  // would sum to with random signs. Chosen on 148 comparisons of a true pose with its likeliest rival (32 simulated
+  // heaps): taken at face value, sums of 1 to 20 nats were wrong as often as right; so, 2 of 18 over 1 nat are wrong and
+  // none of 14 over 3.
+  constexpr int kPatch = 4;  // rendered pixels: one or two millimetres
+  constexpr double kMostOfPatch = 8, kChance = 1.5;
   std::vector<double> out(poses.size(), 0.0);
   if (poses.size() < 2) return out;
   const Renders renders(scene, poses, step_px);
@@ -116,13 +121,14 @@ std::vector<double> log_odds(const SceneDepth& scene, std::span<const std::pair<
   const auto depth = [&](int i, int j) { return scene.z_mm(renders.u0 + i * step_px, renders.v0 + j * step_px); };
 
   // How far whole patches are off their surface in the likeliest pose.
+  constexpr int kFace = 8;
   std::vector<double> means, variances;
-  for (int pj = 0; pj < patches_y; ++pj)
-    for (int pi = 0; pi < patches_x; ++pi) {
+  for (int j0 = 0; j0 < height; j0 += kFace)
+    for (int i0 = 0; i0 < width; i0 += kFace) {
       double sum = 0, variance = 0;
       int n = 0;
-      for (int j = pj * kPatch; j < std::min(height, (pj + 1) * kPatch); ++j)
-        for (int i = pi * kPatch; i < std::min(width, (pi + 1) * kPatch); ++i) {
+      for (int j = j0; j < std::min(height, j0 + kFace); ++j)
+        for (int i = i0; i < std::min(width, i0 + kFace); ++i) {
           const float z = depth(i, j);
           if (!(z > 0)) continue;
           const Prediction p = look(0, i, j, z);
@@ -131,7 +137,7 @@ std::vector<double> log_odds(const SceneDepth& scene, std::span<const std::pair<
           variance += p.sigma_mm * p.sigma_mm;
           ++n;
         }
-      if (n < kPatch * kPatch / 2) continue;
+      if (n < kFace * kFace / 2) continue;
       means.push_back(sum / n);
       variances.push_back(variance / n / n * inflation);
     }
@@ -146,6 +152,12 @@ std::vector<double> log_odds(const SceneDepth& scene, std::span<const std::pair<
       for (int i = 0; i < width; ++i) {
         const float z = depth(i, j);
         if (!(z > 0)) continue;
+        const auto cell = [&](int first, int k) {
+          return static_cast<std::size_t>((first + k * step_px) / scene.cell_px);
+        };
+        const std::size_t at =
+            cell(renders.v0, j) * static_cast<std::size_t>(scene.cell_normal.width) + cell(renders.u0, i);
+        if (elsewhere.holds(at)) continue;
         const Prediction first = look(0, i, j, z), other = look(k, i, j, z);
         if (!first.any && !other.any) continue;
         const double sigma = std::max(first.any ? first.sigma_mm : 0, other.any ? other.sigma_mm : 0);
@@ -154,55 +166,67 @@ std::vector<double> log_odds(const SceneDepth& scene, std::span<const std::pair<
         gain(i, j) = static_cast<float>(first.cost() - other.cost());
       }
     std::vector<double> votes(static_cast<std::size_t>(patches_x) * patches_y, 0.0);
-    double thin = 0, thin_squares = 0;
     for (int j = 1; j + 1 < height; ++j)
       for (int i = 1; i + 1 < width; ++i) {
         if (!tells(i, j)) continue;
+        // Lines one pixel wide come from edges that two refinements put a fraction of a pixel apart.
         int near = 0;
         for (int dj = -1; dj <= 1; ++dj)
           for (int di = -1; di <= 1; ++di) near += tells(i + di, j + dj);
-        if (near >= 6) {
-          votes[static_cast<std::size_t>(j / kPatch) * patches_x + i / kPatch] += gain(i, j);
-        } else {
-          thin += gain(i, j);
-          thin_squares += gain(i, j) * gain(i, j);
-        }
+        if (near >= 6) votes[static_cast<std::size_t>(j / kPatch) * patches_x + i / kPatch] += gain(i, j);
       }
-    for (const double vote : votes) out[k] += std::clamp(vote / inflation, -kMostOfPatch, kMostOfPatch);
-    // Lines one pixel wide come from slits and rims, and from edges that two refinements put a fraction of a pixel
-    // apart, which vote either way: what two sd of such a vote exceed counts.
-    const double chance = 2 * std::sqrt(thin_squares / inflation);
-    out[k] += std::copysign(std::max(0.0, std::abs(thin) / inflation - chance), thin);
+    double sum = 0, squares = 0;
+    for (const double vote : votes) {
+      const double counted = std::clamp(vote / inflation, -kMostOfPatch, kMostOfPatch);
+      sum += counted;
+      squares += counted * counted;
+    }
+    out[k] = std::copysign(std::max(0.0, std::abs(sum) - kChance * std::sqrt(squares)), sum);
   });
   return out;
 }
 
-Ranking rank_poses(const SceneDepth& scene, std::span<const std::pair<const Part*, Pose>> poses, int step_px) {
+namespace {
+
+void sort_by(const std::vector<double>& value, std::vector<std::size_t>& order) {
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return value[a] > value[b]; });
+}
+
+}  // namespace
+
+Ranking rank_again(const SceneDepth& scene, std::span<const std::pair<const Part*, Pose>> poses, int step_px,
+                   const CellMask& elsewhere) {
   Ranking out;
   out.order.resize(poses.size());
   std::iota(out.order.begin(), out.order.end(), std::size_t{0});
-  const auto sort_by = [&](const std::vector<double>& value) {
-    std::stable_sort(out.order.begin(), out.order.end(),
-                     [&](std::size_t a, std::size_t b) { return value[a] > value[b]; });
-  };
-  sort_by(log_likelihoods(scene, poses, step_px));
   // Odds are taken against the leader. One nat does not depose it, and three poses may beat each other in a ring.
   constexpr double kMargin = 1;
   constexpr int kChanges = 3;
   for (int i = 0; i < kChanges; ++i) {
     std::vector<std::pair<const Part*, Pose>> ordered;
     for (const std::size_t k : out.order) ordered.push_back(poses[k]);
-    const std::vector<double> odds = log_odds(scene, ordered, step_px);
+    const std::vector<double> odds = log_odds(scene, ordered, step_px, elsewhere);
     std::vector<double> value(poses.size());
     for (std::size_t k = 0; k < odds.size(); ++k) value[out.order[k]] = odds[k];
     const std::size_t leader = out.order[0];
     value[leader] = kMargin;
-    sort_by(value);
+    sort_by(value, out.order);
     value[leader] = 0;
     out.log_odds.clear();
     for (const std::size_t k : out.order) out.log_odds.push_back(std::min(0.0, value[k]));
     if (out.order[0] == leader) break;
   }
+  return out;
+}
+
+Ranking rank_poses(const SceneDepth& scene, std::span<const std::pair<const Part*, Pose>> poses, int step_px) {
+  std::vector<std::size_t> order(poses.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  sort_by(log_likelihoods(scene, poses, step_px), order);
+  std::vector<std::pair<const Part*, Pose>> ordered;
+  for (const std::size_t k : order) ordered.push_back(poses[k]);
+  Ranking out = rank_again(scene, ordered, step_px, {});
+  for (std::size_t& k : out.order) k = order[k];
   return out;
 }
 

@@ -264,6 +264,17 @@ std::vector<Polished> choose(const SceneFeatures& features, const SceneDepth& sc
   return winners;
 }
 
+/// Each part's self-similar poses are decided again, in the order in which the parts were found: the first ones were
+/// when nothing was known of those that stand in front of them.
+void decide_together(const SceneDepth& scene, std::span<const Part> parts, std::vector<Polished>& found) {
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    CellMask elsewhere;
+    for (std::size_t k = 0; k < found.size(); ++k)
+      if (k != i) elsewhere.join(found[k].mask);
+    decide_again(scene, parts, elsewhere, found[i]);
+  }
+}
+
 }  // namespace
 
 Instances recognize(const Primitives& primitives, const PrimitiveModel& observation, const Surfels& surfels,
@@ -280,6 +291,7 @@ Instances recognize(const Primitives& primitives, const PrimitiveModel& observat
   };
   Refused refused;
   Standing stands;
+  std::vector<Polished> found;
   // Rounds on what is left: primitives first, as long as they lead to parts; then pairs of points.
   for (const Source source : {Source::primitives, Source::point_pairs}) {
     constexpr int kRounds = 8;  // each round takes at least one part of those that touch or hide each other
@@ -287,32 +299,36 @@ Instances recognize(const Primitives& primitives, const PrimitiveModel& observat
       if ((out.time_limit = late())) break;
       std::vector<PoseCandidate> candidates;
       for (std::size_t i = 0; i < parts.size(); ++i) {
-        const std::vector<PoseCandidate> found =
+        const std::vector<PoseCandidate> of_part =
             find_candidates(features, scene, parts[i], static_cast<int>(i), source, out.rejected);
-        candidates.insert(candidates.end(), found.begin(), found.end());
+        candidates.insert(candidates.end(), of_part.begin(), of_part.end());
       }
-      const std::vector<Polished> winners =
+      std::vector<Polished> winners =
           choose(features, scene, parts, std::move(candidates), stands, refused, out.rejected);
-      for (const Polished& w : winners) {
-        Instance instance = make_instance(w, parts, scene, features, surfels.scan->noise, options);
+      for (Polished& w : winners) {
         claim_cells(features, w.mask);
-        const auto kept_back = [&](const char* test, double value, double limit) {
-          add_reason(out.rejected, {instance.part, "acceptance", test, value, limit, 1,
-                                    place_of(parts[static_cast<std::size_t>(w.candidate.part)], w.candidate)});
-        };
-        if (const double sure = instance.score / share_of_first(instance); sure < kGivenOut) {
-          kept_back("probability", sure, kGivenOut);
-        } else if (instance.score < kGivenOut) {
-          kept_back("self_similar", instance.score, kGivenOut);
-          out.uncertain.push_back(std::move(instance));
-        } else if (instance.p_within_tolerance && *instance.p_within_tolerance < kGivenOut) {
-          kept_back("tolerance", *instance.p_within_tolerance, kGivenOut);
-          out.uncertain.push_back(std::move(instance));
-        } else {
-          out.items.push_back(std::move(instance));
-        }
+        found.push_back(std::move(w));
       }
       if (winners.empty()) break;
+    }
+  }
+  decide_together(scene, parts, found);
+  for (const Polished& p : found) {
+    Instance instance = make_instance(p, parts, scene, features, surfels.scan->noise, options);
+    const auto kept_back = [&](const char* test, double value, double limit) {
+      add_reason(out.rejected, {instance.part, "acceptance", test, value, limit, 1,
+                                place_of(parts[static_cast<std::size_t>(p.candidate.part)], p.candidate)});
+    };
+    if (const double sure = instance.score / share_of_first(instance); sure < kGivenOut) {
+      kept_back("probability", sure, kGivenOut);
+    } else if (instance.score < kGivenOut) {
+      kept_back("self_similar", instance.score, kGivenOut);
+      out.uncertain.push_back(std::move(instance));
+    } else if (instance.p_within_tolerance && *instance.p_within_tolerance < kGivenOut) {
+      kept_back("tolerance", *instance.p_within_tolerance, kGivenOut);
+      out.uncertain.push_back(std::move(instance));
+    } else {
+      out.items.push_back(std::move(instance));
     }
   }
   int id = 0;
