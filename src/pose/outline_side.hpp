@@ -39,8 +39,10 @@ template <typename Step>
 Beside look_beside(const SceneDepth& scene, double u, double v, Step du, Step dv, int first, int near, int last,
                    const OutlineFacet& facet, double tolerance_mm) {
   for (int far = first; far <= last; ++far) {
-    const int x = static_cast<int>(std::floor(u + far * du + 0.5)), y = static_cast<int>(std::floor(v + far * dv + 0.5));
-    if (!scene.z_mm.contains(x, y)) return far <= near ? Beside::hidden : Beside::ends;  // the image's border is no edge
+    const int x = static_cast<int>(std::floor(u + far * du + 0.5)),
+              y = static_cast<int>(std::floor(v + far * dv + 0.5));
+    if (!scene.z_mm.contains(x, y))
+      return far <= near ? Beside::hidden : Beside::ends;  // the image's border is no edge
     const float z_out = scene.z_mm(x, y);
     if (!(z_out > 0)) continue;
     const Beside seen = beside_pixel(scene, x, y, z_out, facet, tolerance_mm);

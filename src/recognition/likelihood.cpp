@@ -99,13 +99,13 @@ std::vector<double> log_likelihoods(const SceneDepth& scene, std::span<const std
   return out;
 }
 
-std::vector<double> log_odds(const SceneDepth& scene, std::span<const std::pair<const Part*, Pose>> poses,
-                             int step_px, const CellMask& elsewhere) {
+std::vector<double> log_odds(const SceneDepth& scene, std::span<const std::pair<const Part*, Pose>> poses, int step_px,
+                             const CellMask& elsewhere) {
   // Votes are counted by patches of the image: mirrored light, a burr, an edge a fraction of a pixel off move whole
   // patches, of either sign. So a patch counts at most 8 nats, and the sum counts beyond 1.5 sd of what the same votes
   // would sum to with random signs. Chosen on 148 comparisons of a true pose with its likeliest rival (32 simulated
-  // heaps): taken at face value, sums of 1 to 20 nats were wrong as often as right; so, 2 of 18 over 1 nat are wrong and
-  // none of 14 over 3.
+  // heaps): taken at face value, sums of 1 to 20 nats were wrong as often as right; so, 2 of 18 over 1 nat are wrong
+  // and none of 14 over 3.
   constexpr int kPatch = 4;  // rendered pixels: one or two millimetres
   constexpr double kMostOfPatch = 8, kChance = 1.5;
   std::vector<double> out(poses.size(), 0.0);
