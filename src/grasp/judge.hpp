@@ -9,6 +9,9 @@
 // One candidate in a scene: its path, and the checks in their order.
 namespace tribin::grasp {
 
+/// Gaps that large are as good as any.
+inline constexpr double kFarGap_mm = 10;
+
 struct Refusal {
   Why why;
   double value = 0, limit = 0;
@@ -29,8 +32,6 @@ struct Attempt {
   std::vector<PathPoint> path;
   std::vector<std::vector<Convex>> moves;  ///< the open tool, swept along each piece of the path
   std::optional<ArmPath> arm_path;
-
-  std::size_t pick() const { return path.size() - 2; }
 };
 
 using Checked = std::optional<Refusal>;
@@ -41,6 +42,15 @@ Checked judge_place(const SceneFacts& facts, Attempt& attempt);
 Checked judge_walls(const SceneFacts& facts, Attempt& attempt);
 /// Reach, and all that the tool, the part in hand and the arm could touch.
 Checked judge_way(const SceneFacts& facts, Attempt& attempt);
+
+/// The steps of both, which pushes take too. \param pick  which point of the path is the tightest
+Checked check_workspace(const SceneFacts& facts, const Attempt& attempt);
+Checked check_reach(const SceneFacts& facts, Attempt& attempt, std::size_t pick);
+Checked check_tool_walls(const SceneFacts& facts, Attempt& attempt);
+Checked check_tool_scene(const SceneFacts& facts, Attempt& attempt);
+
+/// The lowest point of a part along a direction of the base [mm].
+double lowest_of(const PartHere& here, const Vec3& up);
 
 /// Straight in along the tool and straight up, from above the bin and back there.
 void make_path(const SceneFacts& facts, Attempt& attempt);

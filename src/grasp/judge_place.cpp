@@ -55,7 +55,7 @@ Checked check_opening(const SceneFacts& facts, Attempt& a) {
   } else {
     const double at = a.candidate->opening_mm, low = a.gripper->stroke_min(), high = a.gripper->stroke_max();
     if (at < low || at > high) return Refusal{Why::stroke, at, at < low ? low : high};
-    const double wanted = 3 * a.sigma_mm + facts.options->clearance_mm;
+    const double wanted = std::hypot(3 * a.sigma_mm, facts.options->clearance_mm);
     a.room_mm = std::min(wanted, (a.gripper->inside ? at - low : high - at) / 2);
     a.opening_before_mm = a.gripper->inside ? at - 2 * a.room_mm : at + 2 * a.room_mm;
   }

@@ -4,14 +4,10 @@
 #include "bin_space.hpp"
 #include "judge.hpp"
 
-// Path and reach, then all that the tool and the part in hand could touch, cheapest first.
+// Path and reach, and what becomes of the part in hand.
 namespace tribin::grasp {
 namespace {
 
-// Gaps that large are as good as any.
-constexpr double kFar_mm = 10;
-// The open tool passes the part itself by that much at least; along the closing direction it has its room.
-constexpr double kOwn_mm = 0.3;
 // A part that stands at a wall may seem to lie that deep in it.
 constexpr double kAtWall_mm = 3;
 
@@ -19,123 +15,6 @@ PathPoint point_at(Step step, const Pose& pose, const Vec3& move = Vec3::Zero())
   PathPoint point{step, pose, {}};
   point.base_from_tcp.translation() += move;
   return point;
-}
-
-/// The lowest point of a part along a direction of the base [mm].
-double lowest_of(const PartHere& here, const Vec3& up) {
-  const Vec3 in_part = here.base_from_part.linear().transpose() * up;
-  double low = 1e300;
-  for (const Vec3f& p : here.part->part->mesh.vertices) low = std::min(low, in_part.dot(p.cast<double>()));
-  return low + up.dot(here.base_from_part.translation());
-}
-
-Checked check_workspace(const SceneFacts& facts, const Attempt& a) {
-  if (!facts.scene->workspace) return {};
-  for (const PathPoint& point : a.path) {
-    const Vec3 p = point.base_from_tcp.translation();
-    const CellRange& box = *facts.scene->workspace;
-    const double out = std::max((box.min - p).maxCoeff(), (p - box.max).maxCoeff());
-    if (out > 0) return Refusal{Why::workspace, out, 0};
-  }
-  return {};
-}
-
-Checked check_reach(const SceneFacts& facts, Attempt& a) {
-  if (!facts.scene->arm) return {};
-  std::vector<Pose> poses;
-  for (const PathPoint& point : a.path) poses.push_back(point.base_from_tcp);
-  ArmPathResult followed =
-      follow(*facts.scene->arm, a.gripper->gripper.flange_from_tcp, poses, a.pick(), *facts.options);
-  if (!followed.path) return Refusal{followed.why, followed.value, followed.limit};
-  a.arm_path = std::move(followed.path);
-  for (std::size_t i = 0; i < a.path.size(); ++i) a.path[i].joints = a.arm_path->along[a.arm_path->at_points[i]];
-  return {};
-}
-
-/// The tool on each piece of its path: open on the way in, and as open on the way out (it holds less wide).
-/// \param gap  (body, enough) -> its gap
-template <class Gap>
-Checked check_tool(Attempt& a, Why why, double clearance, const Gap& gap) {
-  double least = std::max(a.clearance_mm, clearance);
-  for (const auto& tool : a.moves)
-    for (const Convex& body : tool) {
-      least = std::min(least, gap(body, least));
-      if (least < clearance) return Refusal{why, least, clearance};
-    }
-  a.clearance_mm = std::min(a.clearance_mm, least);
-  return {};
-}
-
-Checked check_bodies(Attempt& a, const std::vector<Convex>& bodies, Why why, double clearance) {
-  return check_tool(a, why, clearance, [&](const Convex& body, double enough) {
-    double least = enough;
-    for (const Convex& other : bodies) least = std::min(least, distance_mm(body, other, least));
-    return least;
-  });
-}
-
-Checked check_scan(const SceneFacts& facts, Attempt& a) {
-  if (!a.around) return {};
-  const double clearance =
-      facts.options->clearance_mm + 3 * hand_eye_sigma(*facts.scene, a.base_from_tcp.translation());
-  return check_tool(a, Why::scan, clearance,
-                    [&](const Convex& body, double enough) { return a.around->gap_mm(body, enough); });
-}
-
-/// The part itself, beside the jaws: the open tool passes it. Cups and magnets touch it with their front.
-Checked check_own(const SceneFacts& facts, const Attempt& a) {
-  const PartHere& here = facts.scene->parts[a.part];
-  const Pose part_from_base = here.base_from_part.inverse();
-  const double limit = std::min(kOwn_mm, 0.5 * a.room_mm);
-  for (const auto& tool : a.moves)
-    for (std::size_t k = 0; k < tool.size(); ++k) {
-      if (a.gripper->jaws == 0 && a.gripper->pieces[k].jaw) continue;
-      const double gap = here.part->tree->gap_mm(moved(part_from_base, tool[k]), limit);
-      if (gap < limit) return Refusal{Why::part, gap, limit};
-    }
-  return {};
-}
-
-/// What lies between the jaws, or under a magnet, when they close: it would be taken along.
-std::vector<Convex> closing_space(const Attempt& a) {
-  const GripperShape& g = *a.gripper;
-  if (g.inside) return {};
-  const Pad& pad = g.pad;
-  Pose middle = Pose::Identity();
-  if (g.jaws == 2) {
-    middle.translation().z() = pad.tip_mm - pad.length_mm / 2;
-    return {moved(a.base_from_tcp, make_box(middle, Vec3(a.opening_before_mm, pad.width_mm, pad.length_mm)))};
-  }
-  if (g.jaws == 3)
-    return {moved(a.base_from_tcp, make_cylinder(Vec3(0, 0, pad.tip_mm - pad.length_mm / 2), Vec3::UnitZ(),
-                                                 a.opening_before_mm / 2, pad.length_mm))};
-  return {moved(a.base_from_tcp, make_cylinder(Vec3::Zero(), Vec3::UnitZ(), g.cup_mm, 0))};
-}
-
-Checked check_parts(const SceneFacts& facts, Attempt& a) {
-  if (const auto refusal = check_own(facts, a)) return refusal;
-  const std::vector<Convex> between = closing_space(a);
-  const Vec3 tcp = a.base_from_tcp.translation();
-  double reach = a.gripper->stroke_max();
-  for (const auto& tool : a.moves)
-    for (const Convex& body : tool)
-      reach = std::max(reach, (body.frame_from_body.translation() - tcp).norm() + body.half_mm.norm() + body.disc_mm +
-                                  body.radius_mm + body.sweep_mm.norm());
-  for (std::size_t j = 0; j < facts.parts.size(); ++j) {
-    const PartFacts& other = facts.parts[j];
-    if (static_cast<int>(j) == a.part || (other.center - tcp).norm() > other.radius_mm + reach + kFar_mm) continue;
-    const PartHere& there = facts.scene->parts[j];
-    const Pose part_from_base = there.base_from_part.inverse();
-    const MeshTree& tree = *there.part->tree;
-    const auto gap = [&](const Convex& body, double enough) {
-      return tree.gap_mm(moved(part_from_base, body), enough);
-    };
-    if (const auto refusal = check_tool(a, Why::part, facts.options->clearance_mm + 3 * other.sigma_mm, gap))
-      return refusal;
-    for (const Convex& space : between)
-      if (gap(space, kOwn_mm) < kOwn_mm) return Refusal{Why::held_part, gap(space, kOwn_mm), kOwn_mm};
-  }
-  return {};
 }
 
 /// The part on its way up: no wall may come nearer than where it lies now.
@@ -175,6 +54,35 @@ Checked check_place(const SceneFacts& facts, const Attempt& a) {
 
 }  // namespace
 
+double lowest_of(const PartHere& here, const Vec3& up) {
+  const Vec3 in_part = here.base_from_part.linear().transpose() * up;
+  double low = 1e300;
+  for (const Vec3f& p : here.part->part->mesh.vertices) low = std::min(low, in_part.dot(p.cast<double>()));
+  return low + up.dot(here.base_from_part.translation());
+}
+
+Checked check_workspace(const SceneFacts& facts, const Attempt& a) {
+  if (!facts.scene->workspace) return {};
+  for (const PathPoint& point : a.path) {
+    const Vec3 p = point.base_from_tcp.translation();
+    const CellRange& box = *facts.scene->workspace;
+    const double out = std::max((box.min - p).maxCoeff(), (p - box.max).maxCoeff());
+    if (out > 0) return Refusal{Why::workspace, out, 0};
+  }
+  return {};
+}
+
+Checked check_reach(const SceneFacts& facts, Attempt& a, std::size_t pick) {
+  if (!facts.scene->arm) return {};
+  std::vector<Pose> poses;
+  for (const PathPoint& point : a.path) poses.push_back(point.base_from_tcp);
+  ArmPathResult followed = follow(*facts.scene->arm, a.gripper->gripper.flange_from_tcp, poses, pick, *facts.options);
+  if (!followed.path) return Refusal{followed.why, followed.value, followed.limit};
+  a.arm_path = std::move(followed.path);
+  for (std::size_t i = 0; i < a.path.size(); ++i) a.path[i].joints = a.arm_path->along[a.arm_path->at_points[i]];
+  return {};
+}
+
 void make_path(const SceneFacts& facts, Attempt& a) {
   const std::vector<Convex> tool = pieces_at(*a.gripper, a.opening_before_mm);
   const Vec3 in = a.base_from_tcp.linear().col(2), up = Vec3::UnitZ();
@@ -207,19 +115,15 @@ void make_path(const SceneFacts& facts, Attempt& a) {
 }
 
 Checked judge_walls(const SceneFacts& facts, Attempt& a) {
-  const double clearance = facts.options->clearance_mm;
-  a.clearance_mm = std::max(kFar_mm, clearance);
+  a.clearance_mm = std::max(kFarGap_mm, facts.options->clearance_mm);
   make_path(facts, a);
   if (const auto refusal = check_workspace(facts, a)) return refusal;
-  return check_bodies(a, facts.bin, Why::bin, clearance);
+  return check_tool_walls(facts, a);
 }
 
 Checked judge_way(const SceneFacts& facts, Attempt& a) {
-  const double clearance = facts.options->clearance_mm;
-  if (const auto refusal = check_reach(facts, a)) return refusal;
-  if (const auto refusal = check_scan(facts, a)) return refusal;
-  if (const auto refusal = check_parts(facts, a)) return refusal;
-  if (const auto refusal = check_bodies(a, facts.scene->obstacles, Why::obstacle, clearance)) return refusal;
+  if (const auto refusal = check_reach(facts, a, a.path.size() - 2)) return refusal;
+  if (const auto refusal = check_tool_scene(facts, a)) return refusal;
   if (const auto refusal = check_held(facts, a)) return refusal;
   if (const auto refusal = check_arm(facts, a)) return refusal;
   return check_place(facts, a);

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <map>
 
+#include "counted.hpp"
 #include "judge.hpp"
 #include "tribin/core/parallel.hpp"
 
@@ -132,11 +133,6 @@ class GripperPlan {
   std::vector<const Candidate*> candidates_;
 };
 
-bool may_use(const PlanOptions& options, const std::string& gripper) {
-  return options.grippers.empty() ||
-         std::find(options.grippers.begin(), options.grippers.end(), gripper) != options.grippers.end();
-}
-
 /// What is against all grasps of a part.
 Checked judge_part(const SceneFacts& facts, int part) {
   const PartHere& here = facts.scene->parts[part];
@@ -165,6 +161,13 @@ PartPlan plan_part(const SceneFacts& facts, int part) {
   return out;
 }
 
+}  // namespace
+
+bool may_use(const PlanOptions& options, const std::string& gripper) {
+  return options.grippers.empty() ||
+         std::find(options.grippers.begin(), options.grippers.end(), gripper) != options.grippers.end();
+}
+
 std::vector<WhyCount> counted(const std::vector<RefusedGrasp>& refused) {
   std::array<int, kWhys> counts{};
   for (const RefusedGrasp& r : refused) ++counts[static_cast<int>(r.why)];
@@ -175,12 +178,10 @@ std::vector<WhyCount> counted(const std::vector<RefusedGrasp>& refused) {
   return out;
 }
 
-}  // namespace
-
 std::string_view name_of(Why why) { return kWhyNames[static_cast<int>(why)]; }
 
 std::string_view name_of(Step step) {
-  constexpr std::array<std::string_view, 4> kNames = {"entry", "pre_pick", "pick", "retreat"};
+  constexpr std::array<std::string_view, 5> kNames = {"entry", "pre_pick", "pick", "push", "retreat"};
   return kNames[static_cast<int>(step)];
 }
 

@@ -16,6 +16,8 @@ constexpr double kLeastPads = 0.05;
 // With that much of the pads on it a part is held as well as can be: rounds touch along a line only.
 constexpr double kGoodPads = 0.3;
 constexpr double kLeastMagnet = 0.7;
+// A spare candidate nearer to another than that share of the part, in the same direction, is dropped.
+constexpr double kNearShare = 0.06;
 
 Vec3 mass_center(const Part& part, const MeshTree& tree) {
   Vec3 moment = Vec3::Zero();
@@ -69,6 +71,18 @@ std::optional<Candidate> tried(const GraspPart& known, int gripper, const Seed& 
   return c;
 }
 
+/// Whether no other candidate is as good as the same.
+bool is_new(const Candidate& c, const std::vector<Candidate>& known, std::size_t from, double near_mm) {
+  constexpr double kTraceNear = 1 + 2 * 0.95;  // of R' R: 18 deg
+  for (std::size_t i = from; i < known.size(); ++i) {
+    const Pose &a = known[i].part_from_tcp, &b = c.part_from_tcp;
+    if ((a.translation() - b.translation()).squaredNorm() < near_mm * near_mm &&
+        a.linear().cwiseProduct(b.linear()).sum() > kTraceNear)
+      return false;
+  }
+  return true;
+}
+
 void add_candidates(GraspPart& known, int gripper) {
   const GripperShape& g = known.grippers[gripper];
   const std::vector<Seed> seeds = known.cell.pick_points.empty()
@@ -79,8 +93,10 @@ void add_candidates(GraspPart& known, int gripper) {
     for (int i = begin; i < end; ++i) found[i] = tried(known, gripper, seeds[i]);
   });
   const std::size_t before = known.candidates.size();
-  for (const auto& candidate : found)
-    if (candidate) known.candidates.push_back(*candidate);
+  const double near_mm = kNearShare * known.part->diameter_mm;
+  for (std::size_t i = 0; i < found.size(); ++i)
+    if (found[i] && (!seeds[i].spare || is_new(*found[i], known.candidates, before, near_mm)))
+      known.candidates.push_back(*found[i]);
   if (known.candidates.size() == before)
     known.warnings.push_back("part " + known.part->name + ": gripper " + g.gripper.name + " finds no hold (of " +
                              std::to_string(seeds.size()) + " places tried)");

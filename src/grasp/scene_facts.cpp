@@ -31,6 +31,7 @@ void validate(const PlanOptions& o) {
   must(o.clearance_mm >= 0 && o.clearance_mm <= 100, "clearance_mm", o.clearance_mm, "[0, 100]");
   must(o.min_score >= 0 && o.min_score <= 1, "min_score", o.min_score, "[0, 1]");
   must(o.max_covered >= 0 && o.max_covered <= 1, "max_covered", o.max_covered, "[0, 1]");
+  must(o.push_mm > 0 && o.push_mm <= 1000, "push_mm", o.push_mm, "(0, 1000]");
   must(o.looks > 0, "looks", o.looks, "1 and more");
   must(o.most_per_part > 0, "most_per_part", o.most_per_part, "1 and more");
 }

@@ -6,8 +6,6 @@
 namespace tribin::grasp {
 namespace {
 
-// Gaps that large are as good as any.
-constexpr double kFar_mm = 10;
 // Twice the weight: what a path's accelerations ask for.
 constexpr double kHoldWell = 2;
 // Where a pick failed, its neighbours come later. The design's distance.
@@ -51,9 +49,9 @@ Grasp scored(const SceneFacts& facts, const Attempt& a) {
   term("contact", c.contact);
   term("offset", 1 / (1 + c.offset_mm / (0.25 * here.part->part->diameter_mm)));
   term("hold", a.hold / kHoldWell);
-  term("room", a.gripper->jaws == 0 ? 1 : a.room_mm / (3 * a.sigma_mm + facts.options->clearance_mm));
+  term("room", a.gripper->jaws == 0 ? 1 : a.room_mm / std::hypot(3 * a.sigma_mm, facts.options->clearance_mm));
   term("clearance", 0.5 + 0.5 * (a.clearance_mm - facts.options->clearance_mm) /
-                              (std::max(kFar_mm, facts.options->clearance_mm) - facts.options->clearance_mm + 1e-9));
+                              (std::max(kFarGap_mm, facts.options->clearance_mm) - facts.options->clearance_mm + 1e-9));
   if (a.arm_path) {
     term("joints", 0.5 + 0.5 * a.arm_path->limit_term);
     term("singularity", 0.5 + 0.5 * a.arm_path->singularity_term);

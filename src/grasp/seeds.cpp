@@ -67,13 +67,14 @@ class Seeder {
       along_axes(false);
       between_faces(false);
       on_balls();
+      through_points();
     }
     return std::move(seeds_);
   }
 
  private:
   void add(const Vec3& at, const Vec3& closing, const Vec3& approach, double beyond, const std::string& family) {
-    seeds_.push_back({tcp_at(at + (beyond - pad_.tip_mm) * approach, closing, approach), family, 1, false});
+    seeds_.push_back({tcp_at(at + (beyond - pad_.tip_mm) * approach, closing, approach), family});
   }
 
   bool fits(double width) const { return width >= gripper_.stroke_min() && width <= gripper_.stroke_max(); }
@@ -200,11 +201,34 @@ class Seeder {
     }
   }
 
+  /// What no primitive tells: points all over the surface, and what lies opposite of them.
+  void through_points() {
+    constexpr std::size_t kPoints = 160;
+    const std::size_t count = part_.sample_points.size(), step = std::max<std::size_t>(1, count / kPoints);
+    for (std::size_t i = step / 2; i < count; i += step) {
+      const Vec3 in = -part_.sample_normals[i].cast<double>().normalized();
+      const Vec3 at = part_.sample_points[i].cast<double>();
+      constexpr double kOff_mm = 0.01;  // from the surface itself
+      const auto hit = tree_.first_hit(at + kOff_mm * in, in, gripper_.stroke_max());
+      if (!hit || !fits(hit->t + kOff_mm)) continue;
+      if (tree_.normal(hit->triangle).dot(in) < std::cos(std::atan(gripper_.gripper.friction))) continue;
+      Vec3 u, v;
+      orthonormal_basis(in, u, v);
+      for (int k = 0; k < kTurns; ++k) {
+        const Vec3 approach = std::cos(k * kTurn) * u + std::sin(k * kTurn) * v;
+        for (const double d : depths(pad_, hit->t)) {
+          add(at + 0.5 * hit->t * in, in, approach, d, "points");
+          seeds_.back().spare = true;
+        }
+      }
+    }
+  }
+
   void add_cup(const Vec3& at, const Vec3& outward, const std::string& family) {
     Vec3 u, v;
     orthonormal_basis(outward, u, v);
     for (int k = 0; k < kTurns; k += 3)  // the cup does not mind; flange and body may
-      seeds_.push_back({tcp_at(at, std::cos(k * kTurn) * u + std::sin(k * kTurn) * v, -outward), family, 1, false});
+      seeds_.push_back({tcp_at(at, std::cos(k * kTurn) * u + std::sin(k * kTurn) * v, -outward), family});
   }
 
   void on_planes() {
@@ -288,7 +312,7 @@ std::vector<Seed> taught_seeds(const Part& part, const CellPart& cell, const std
           if (2 * rolls == kTurns && k == -rolls) continue;  // half a turn to either side is the same
           const Pose roll = turned_about(Vec3::Zero(), Vec3::UnitZ(), k * kTurn);
           out.push_back({symmetric * point.part_from_tcp * lean * roll,
-                         point.name.empty() ? "taught" : "taught " + point.name, point.priority, true});
+                         point.name.empty() ? "taught" : "taught " + point.name, point.priority, true, false});
         }
   }
   return out;

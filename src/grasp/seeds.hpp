@@ -14,6 +14,7 @@ struct Seed {
   std::string family;
   double priority = 1;
   bool taught = false;
+  bool spare = false;  ///< wanted only where no other holds nearby
 };
 
 /// Jaws: across cylinders and cones and along their axes, across pairs of parallel faces, in bores and slots. Three

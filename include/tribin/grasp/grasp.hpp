@@ -71,13 +71,15 @@ struct PlanOptions {
   std::vector<std::string> grippers;   ///< names of those that may be used now; empty = all of the part's
   double approach_mm = 100;            ///< (0, 1000] least way from pre-pick to pick
   double retreat_mm = 100;             ///< (0, 1000] least way up with the part
-  double clearance_mm = 2;             ///< [0, 100] between what moves and what it must not touch, beyond 3 sigma
+  double clearance_mm =
+      2;  ///< [0, 100] between what moves and what it must not touch; with 3 sigma as independent errors
   double limit_margin_rad = 2 * kDegree;  ///< of joints, see robot::Margins
   double singularity = 0.1;               ///< the same
   double min_score = 0;                   ///< of an instance, [0, 1]
   double max_covered = 0.1;               ///< share of a part, seen from above, that something may lie on, [0, 1]
-  int looks = 60;                         ///< > 0, candidates looked at closely, a part and gripper
+  int looks = 200;                        ///< > 0, candidates looked at closely, a part and gripper
   int most_per_part = 3;                  ///< > 0, grasps given out, a part and gripper
+  double push_mm = 40;                    ///< (0, 1000] length of a push
   std::vector<FailedPick> failed;
 };
 
@@ -108,7 +110,7 @@ inline constexpr int kWhys = 20;
 /// The enumerator's own name: stable, programs compare it.
 std::string_view name_of(Why why);
 
-enum class Step { entry, pre_pick, pick, retreat };
+enum class Step { entry, pre_pick, pick, push, retreat };
 std::string_view name_of(Step step);
 
 /// A place on the path. Moves between neighbours are straight, in one configuration of the arm.
@@ -178,7 +180,7 @@ struct Push {
   int id = 0;
   std::string part_name, gripper;
   double length_mm = 0;  ///< of the push
-  /// pre_pick (above), pick (where it begins, beside the part), then `retreat` twice: where it ends, and up again.
+  /// pre_pick (above the bin), pick (beside the part), push (where it ends) and retreat (above the bin).
   std::vector<PathPoint> path;
   std::vector<Term> terms;
   double score = 0;
@@ -190,7 +192,9 @@ struct PushPlan {
   std::vector<WhyCount> reasons;
 };
 
-/// Plans pushes that move a part away from the nearest wall and from what it leans on, checked like grasps.
+/// Plans pushes with the closed gripper, upright, along the floor: beside the part at half its height, or near its top,
+/// which turns it over. They lead towards the bin's middle, by `push_mm`, and are checked like grasps; what is in the
+/// part's own way is not. Covered parts are pushed too.
 /// \throws Error bad_option for options out of range.
 PushPlan plan_pushes(const Scene& scene, const PlanOptions& options = {});
 
