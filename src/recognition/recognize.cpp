@@ -10,6 +10,7 @@
 #include "tribin/core/error.hpp"
 #include "tribin/core/parallel.hpp"
 #include "tribin/pose/systematic_error.hpp"
+#include "weak_directions.hpp"
 
 namespace tribin {
 namespace {
@@ -77,7 +78,9 @@ Instance make_instance(const Polished& p, std::span<const Part> parts, const Sce
   RefineOptions options = refine_options(part, step, 3, std::max(0.002 * part.diameter_mm, 4 * scene.median_sigma_mm));
   options.outlines = true;
   options.frozen = free_directions_about_center(part, p.candidate.camera_from_part);
-  const Refinement refined = refine_guarded(part, scene, p.candidate.camera_from_part, options);
+  Refinement refined = refine_guarded(part, scene, p.candidate.camera_from_part, options);
+  settle_weak_directions(part, scene, options.frozen,
+                         std::max(step, step_for(part, scene, p.candidate.camera_from_part, 10000)), refined);
   out.camera_from_part = refined.camera_from_part;
   const Vec3 center(out.camera_from_part * part.box_center());
   const Matrix6 pull = pull_of_systematic_errors(part.render_mesh, scene, out.camera_from_part, noise, center, step,

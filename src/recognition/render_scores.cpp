@@ -9,8 +9,12 @@
 namespace tribin {
 namespace {
 
-double score_of(const SceneDepth& scene, const IndexRender& render, double chord_error_mm) {
-  constexpr float kUnexplained = 0.5f * 16;  // 4 sigma: what a pixel costs that no surface explains
+constexpr float kUnexplained = 0.5f * 16;  // 4 sigma: what a pixel costs that no surface explains
+
+/// The sum over covered, measured pixels of what `worth` makes of (half the squared residual in sigma, the residual in
+/// mm along the normal, > 0 behind the surface).
+template <typename Worth>
+double sum_of(const SceneDepth& scene, const IndexRender& render, double chord_error_mm, const Worth& worth) {
   const PinholeCamera& camera = scene.camera;
   const Image<float>& tiles = scene.surfels->local_sigma_mm;
   const int tile_px = 8 * scene.cell_px;
@@ -38,27 +42,43 @@ double score_of(const SceneDepth& scene, const IndexRender& render, double chord
       const float slant = std::max(0.2f, std::abs(n[0] * ray_x + n[1] * ray_y + n[2]));
       const float error = (z - 1 / render.inverse_z[k]) * slant;
       const float variance = sigma * slant * sigma * slant + cad_variance;
-      row += kUnexplained - std::min(kUnexplained, 0.5f * error * error / variance);
+      row += worth(0.5f * error * error / variance, error);
     }
     sum += row;
   }
   return sum;
 }
 
-}  // namespace
-
-std::vector<double> render_scores(const SceneDepth& scene, const Part& part, std::span<const Pose> poses, int step_px) {
+template <typename Worth>
+std::vector<double> sums_of(const SceneDepth& scene, const Part& part, std::span<const Pose> poses, int step_px,
+                            const Worth& worth) {
   std::vector<double> out(poses.size());
   parallel_each(static_cast<int>(poses.size()), [&](int i) {
     const auto k = static_cast<std::size_t>(i);
     thread_local IndexRender render;
     render_index(part.render_mesh, scene.camera, poses[k], step_px, render);
-    out[k] = score_of(scene, render, part.mesh.chord_error_mm);
+    out[k] = sum_of(scene, render, part.mesh.chord_error_mm, worth);
   });
   // Pixels closer than the noise's correlation tell the same story.
   const double inflation = std::max(1.0, correlation_inflation(scene.correlation_px) / (double(step_px) * step_px));
-  for (double& score : out) score /= inflation;
+  for (double& sum : out) sum /= inflation;
   return out;
+}
+
+}  // namespace
+
+std::vector<double> render_scores(const SceneDepth& scene, const Part& part, std::span<const Pose> poses, int step_px) {
+  return sums_of(scene, part, poses, step_px,
+                 [](float half_square, float) { return kUnexplained - std::min(kUnexplained, half_square); });
+}
+
+std::vector<double> contradictions(const SceneDepth& scene, const Part& part, std::span<const Pose> poses,
+                                   int step_px) {
+  const auto near = static_cast<float>(0.03 * part.diameter_mm);
+  constexpr float kNoise = 0.5f * 9;  // 3 sigma
+  return sums_of(scene, part, poses, step_px, [near](float half_square, float error) {
+    return half_square < kNoise || error < -near ? 0 : std::min(kUnexplained, half_square);
+  });
 }
 
 }  // namespace tribin

@@ -13,4 +13,8 @@ namespace tribin {
 /// rendered and forgotten, by itself: no common window is looked at.
 std::vector<double> render_scores(const SceneDepth& scene, const Part& part, std::span<const Pose> poses, int step_px);
 
+/// What of the scan contradicts each pose, in the same nats: where it is looked through, or not at its surface but near
+/// it (3 % of the diameter). What hides the part counts nothing, and neither does what it explains or leaves over.
+std::vector<double> contradictions(const SceneDepth& scene, const Part& part, std::span<const Pose> poses, int step_px);
+
 }  // namespace tribin
