@@ -111,39 +111,52 @@ grasp::PlanOptions Chooser::plan_options(Resort resort, std::vector<grasp::Faile
   return options;
 }
 
-std::optional<Placing> Chooser::place(const std::string& part, const std::string& gripper, double opening_mm,
-                                      const Pose& tcp_from_part, const Filling& filling, bool station) const {
+std::optional<std::vector<Stop>> Chooser::way(const Start& start, const Pose& base_from_tcp,
+                                              const std::string& gripper) const {
+  ArmWithTool arm = arm_with(gripper);
+  arm.singularity = 0;  // these are moves of the joints
+  return stops_at(arm,
+                  way_between(start.base_from_flange * arm.flange_from_tcp, base_from_tcp, travel_mm(),
+                              cell_.robots.front().way_points),
+                  start.joints, false);
+}
+
+std::optional<Placing> Chooser::place(const Entry& held, const Filling& filling, const Start& start, bool slots,
+                                      bool station) const {
   std::vector<const Slot*> open;
+  if (slots)
+    for (const Slot* slot : open_slots(slots_, filling, cell_.rack->when_missing))
+      if (may_stand(*slot, held.part)) open.push_back(slot);
   Slot at_station;
-  if (station) {
+  if (station && has_station()) {
     at_station.base_from_slot = cell_.regrasp->base_from_station;
     open.push_back(&at_station);
-  } else {
-    for (const Slot* slot : open_slots(slots_, filling, cell_.rack->when_missing))
-      if (may_stand(*slot, part)) open.push_back(slot);
   }
   std::vector<Standing> standing;
   for (std::size_t i = 0; i < filling.size(); ++i)
     if (!filling[i].empty())
       standing.push_back({&vision_.model(filling[i]), slots_[i].base_from_slot * cell_part(filling[i]).slot_from_part});
-  const Held held{&vision_.model(part), &shape(gripper), opening_mm, tcp_from_part};
-  auto placing = plan_place(arm_with(gripper), held, open, alike(*held.part, cell_part(part).slot_from_part), standing);
-  if (placing && station) placing->slot = nullptr;
+  const Held in_hand{&vision_.model(held.part), &shape(held.gripper), held.opening_mm, held.tcp_from_part};
+  auto placing = plan_place(
+      arm_with(held.gripper), in_hand, open, alike(*in_hand.part, cell_part(held.part).slot_from_part), standing,
+      [&](const Placing& p) { return way(start, p.stops[0].base_from_tcp, held.gripper).has_value(); });
+  if (placing && placing->slot == &at_station) placing->slot = nullptr;
   return placing;
 }
 
 std::optional<Choice> Chooser::choose(const grasp::Plan& plan, const Filling& filling,
-                                      std::vector<std::string>& why) const {
+                                      const std::optional<Start>& start, std::vector<std::string>& why) const {
   for (const bool station : {false, true}) {
     if (station && !has_station()) break;
     for (const grasp::Grasp& grasp : plan.grasps) {
-      const Pose tcp_from_part = grasp.part_from_tcp.inverse();
-      auto placing = place(grasp.part_name, grasp.gripper, grasp.opening_before_mm, tcp_from_part, filling, station);
+      if (start && !way(*start, grasp.path.front().base_from_tcp, grasp.gripper)) continue;
+      Entry held;
+      held.part = grasp.part_name, held.gripper = grasp.gripper, held.opening_mm = grasp.opening_before_mm;
+      held.tcp_from_part = grasp.part_from_tcp.inverse();
+      const grasp::PathPoint& retreat = grasp.path.back();
+      const Pose flange = retreat.base_from_tcp * shape(grasp.gripper).gripper.flange_from_tcp.inverse();
+      auto placing = place(held, filling, {flange, retreat.joints}, !station, station);
       if (!placing) continue;
-      const ArmWithTool arm = arm_with(grasp.gripper);
-      std::vector<Pose> way = way_between(grasp.path.back().base_from_tcp, placing->stops[0].base_from_tcp, travel_mm(),
-                                          cell_.robots.front().way_points);
-      if (!stops_at(arm, way, grasp.path.back().joints, false)) continue;
       Choice choice{grasp, vision_.part(grasp.part), std::move(*placing)};
       const std::vector<robot::Refusal> refusals = refusals_of(choice, 0);
       if (refusals.empty()) return choice;

@@ -28,12 +28,23 @@ class Chooser {
   grasp::PlanOptions plan_options(Resort resort, std::vector<grasp::FailedPick> failed) const;
   bool has_more_grippers() const { return cell_.grippers.size() > 1; }
 
-  /// The best grasp whose part can go into a slot; failing that, one whose part can go to the station.
-  /// \param why  gets what software refuses
-  std::optional<Choice> choose(const grasp::Plan& plan, const Filling& filling, std::vector<std::string>& why) const;
-  /// The first open slot for a part that is held like this.
-  std::optional<Placing> place(const std::string& part, const std::string& gripper, double opening_mm,
-                               const Pose& tcp_from_part, const Filling& filling, bool station) const;
+  /// Where the arm stands.
+  struct Start {
+    Pose base_from_flange = Pose::Identity();
+    std::optional<robot::Joints> joints;
+  };
+  /// The best grasp that the arm gets to, and whose part can go into a slot; failing that, one whose part can go to the
+  /// station.
+  /// \param start  none: not known yet
+  /// \param why    gets what software refuses
+  std::optional<Choice> choose(const grasp::Plan& plan, const Filling& filling, const std::optional<Start>& start,
+                               std::vector<std::string>& why) const;
+  /// The first open slot for a part that is held like this; failing that, the station where that is asked for.
+  /// \param start  where its way begins
+  std::optional<Placing> place(const Entry& held, const Filling& filling, const Start& start, bool slots,
+                               bool station) const;
+  /// The stops of a way; none where it is out of reach.
+  std::optional<std::vector<Stop>> way(const Start& start, const Pose& base_from_tcp, const std::string& gripper) const;
 
   ArmWithTool arm_with(const std::string& gripper) const;
   const grasp::GripperShape& shape(const std::string& gripper) const;

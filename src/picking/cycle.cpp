@@ -131,7 +131,7 @@ Phase Run::choose() {
   const Places places = chooser_.places(now().filling);
   const grasp::Plan plan = links_.vision->plan(chooser_.plan_options(resort_, failed), places);
   std::vector<std::string> why;
-  choice_ = chooser_.choose(plan, now().filling, why);
+  choice_ = chooser_.choose(plan, now().filling, here(), why);
   report_.plan_ms += watch.ms();
   report_.refused = plan.reasons;
   report_.resort = resort_;
@@ -199,9 +199,7 @@ Phase Run::pick() {
 
 Phase Run::place() {
   const Entry held = *now().in_hand;
-  auto placing = chooser_.place(held.part, held.gripper, held.opening_mm, held.tcp_from_part, now().filling, false);
-  if (!placing && chooser_.has_station())
-    placing = chooser_.place(held.part, held.gripper, held.opening_mm, held.tcp_from_part, now().filling, true);
+  const auto placing = chooser_.place(held, now().filling, here(), true, true);
   if (!placing) return in_doubt("the gripper holds " + held.part + ", and no open slot can be reached with it");
   travel(placing->stops[0].base_from_tcp, held.gripper);
   Entry entry = held;
@@ -237,9 +235,13 @@ Phase Run::regrasp() {
                   standing.part + " stands at the station and " + why + "; take it away, then say --slot-is empty");
   };
   for (const grasp::Grasp& grasp : plan.grasps) {
-    const auto placing = chooser_.place(standing.part, grasp.gripper, grasp.opening_before_mm,
-                                        grasp.part_from_tcp.inverse(), now().filling, false);
-    if (!placing) continue;
+    Entry held = standing;
+    held.gripper = grasp.gripper, held.opening_mm = grasp.opening_before_mm;
+    held.tcp_from_part = grasp.part_from_tcp.inverse();
+    const Pose flange =
+        grasp.path.back().base_from_tcp * chooser_.shape(grasp.gripper).gripper.flange_from_tcp.inverse();
+    const auto placing = chooser_.place(held, now().filling, {flange, grasp.path.back().joints}, true, false);
+    if (!placing || !chooser_.way(here(), grasp.path.front().base_from_tcp, grasp.gripper)) continue;
     Choice choice;
     choice.grasp = grasp;
     choice.part.base_from_part = standing.base_from_part;
@@ -298,7 +300,7 @@ CycleReport plan_first(const WorkCell& cell, const robot::RobotModel& robot, Vis
     const Stopwatch watch;
     const grasp::Plan plan = vision.plan(chooser.plan_options(resort, {}), chooser.places(filling));
     std::vector<std::string> why;
-    const auto choice = chooser.choose(plan, filling, why);
+    const auto choice = chooser.choose(plan, filling, {}, why);
     report.plan_ms += watch.ms();
     report.resort = resort;
     report.refused = plan.reasons;

@@ -6,14 +6,14 @@
 
 namespace tribin::picking {
 
-Pose Run::here(const std::string& gripper) {
-  if (!base_from_flange_) {
+const Chooser::Start& Run::here() {
+  if (!here_) {
     const robot::CartesianPosition at = links_.controller->position();
     const auto& grippers = links_.cell->grippers;
     const auto tool = static_cast<std::size_t>(std::clamp(at.tool, 1, static_cast<int>(grippers.size())) - 1);
-    base_from_flange_ = robot::pose_of(at) * grippers[tool].flange_from_tcp.inverse();
+    here_ = Chooser::Start{robot::pose_of(at) * grippers[tool].flange_from_tcp.inverse(), {}};
   }
-  return *base_from_flange_ * chooser_.shape(gripper).gripper.flange_from_tcp;
+  return *here_;
 }
 
 robot::CycleResult Run::order(Entry entry, robot::CycleCommand command, const std::vector<Stop>& stops,
@@ -30,8 +30,8 @@ robot::CycleResult Run::order(Entry entry, robot::CycleCommand command, const st
   report_.cycle = order.cycle;
   journal_.write(entry);
   const robot::CycleResult result = robot::run_cycle(*links_.controller, *links_.clock, order, options_.handshake);
-  base_from_flange_ = stops.back().base_from_tcp * chooser_.shape(gripper).gripper.flange_from_tcp.inverse();
-  joints_ = stops.back().joints;
+  here_ = Chooser::Start{stops.back().base_from_tcp * chooser_.shape(gripper).gripper.flange_from_tcp.inverse(),
+                         stops.back().joints};
   note_end(entry, result);
   return result;
 }
@@ -56,14 +56,12 @@ void Run::note_end(const Entry& order, robot::CycleResult result) {
 }
 
 void Run::travel(const Pose& to, const std::string& gripper) {
-  const std::vector<Pose> way =
-      way_between(here(gripper), to, chooser_.travel_mm(), links_.cell->robots.front().way_points);
-  if (way.empty()) return;
-  const auto stops = stops_at(chooser_.arm_with(gripper), way, joints_, false);
+  const auto stops = chooser_.way(here(), to, gripper);
   if (!stops)
     throw Error(ErrorCode::device,
                 "the way between bin and rack is out of the arm's reach; wanted way points "
                 "(robot.way_points), or a workspace that holds it");
+  if (stops->empty()) return;
   Entry entry;
   entry.event = Event::move_ordered;
   entry.scene = scene_;

@@ -73,7 +73,8 @@ std::optional<std::vector<Stop>> stops_at(const ArmWithTool& arm, std::span<cons
 }
 
 std::optional<Placing> plan_place(const ArmWithTool& arm, const Held& held, std::span<const Slot* const> slots,
-                                  std::span<const Pose> slot_from_part, std::span<const Standing> standing) {
+                                  std::span<const Pose> slot_from_part, std::span<const Standing> standing,
+                                  const std::function<bool(const Placing&)>& good) {
   std::vector<grasp::Convex> boxes;
   for (const Standing& other : standing) boxes.push_back(box_of(*other.part, other.base_from_part));
   const Pose part_from_tcp = held.tcp_from_part.inverse();
@@ -85,7 +86,9 @@ std::optional<Placing> plan_place(const ArmWithTool& arm, const Held& held, std:
       const std::array<Pose, 3> tcp = {shifted(at, kAbove_mm * up), at, shifted(at, -kAbove_mm * tool)};
       if (!is_clear(held, tcp, slot->base_from_slot, base_from_part, boxes)) continue;
       const auto stops = stops_at(arm, tcp);
-      if (stops) return Placing{slot, base_from_part, {(*stops)[0], (*stops)[1], (*stops)[2]}};
+      if (!stops) continue;
+      const Placing placing{slot, base_from_part, {(*stops)[0], (*stops)[1], (*stops)[2]}};
+      if (!good || good(placing)) return placing;
     }
   return {};
 }

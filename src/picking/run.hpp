@@ -32,7 +32,7 @@ class Run {
   void travel(const Pose& to, const std::string& gripper);
   void note_end(const Entry& order, robot::CycleResult result);
   bool carry_out_pick(const Choice& choice, int scene);
-  Pose here(const std::string& gripper);
+  const Chooser::Start& here();
 
   Phase finish(const std::string& status, const std::string& message);
   Phase next_resort();
@@ -55,8 +55,7 @@ class Run {
     int scene;
   };
   std::vector<Failed> failed_;
-  std::optional<Pose> base_from_flange_;  ///< where the arm was sent last
-  std::optional<robot::Joints> joints_;
+  std::optional<Chooser::Start> here_;  ///< where the arm was sent last
   RunEnd end_;
 };
 

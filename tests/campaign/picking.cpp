@@ -145,6 +145,18 @@ int main(int argc, char** argv) try {
     totals.placed_without_help += without_help;
     totals.picks += truth.grips;
     judge(cell, truth, journal.state().filling, totals);
+    if (verbose && end.status == "not_pickable") {  // what is left, and why no gripper takes it
+      picking::Places anywhere;
+      for (const CellPart& part : cell.parts) anywhere[part.name];
+      grasp::PlanOptions all;
+      all.most_per_part = 12;
+      const grasp::Plan plan = vision->plan(all, anywhere);
+      std::map<std::string, std::map<std::string, int>> why;
+      for (const auto& refused : plan.refused)
+        ++why["part " + std::to_string(refused.part) + " " + refused.gripper][std::string(name_of(refused.why))];
+      for (const auto& [who, counts] : why) print(("    left: " + who).c_str(), counts);
+      std::printf("    left: %zu grasps that lead to no place\n", plan.grasps.size());
+    }
     int placed = 0;
     for (const sim::PartTruth& part : truth.parts) placed += part.where == sim::Whereabouts::placed;
     std::printf("bin %d (seed %llu): %d of %zu placed, %d grips, %zu collisions, %.0f s; %s: %s\n", bin + 1,

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <functional>
 #include <optional>
 #include <span>
 #include <vector>
@@ -58,8 +59,10 @@ struct Standing {
 /// The first of the slots in which the part can be put: reached before, at and after in one configuration, the open
 /// gripper and the part clear of what stands there and of the slot's own plane.
 /// \param slot_from_part  how it stands in a slot, any of them
+/// \param good            what else it must be, its way among it; none: nothing
 std::optional<Placing> plan_place(const ArmWithTool& arm, const Held& held, std::span<const Slot* const> slots,
-                                  std::span<const Pose> slot_from_part, std::span<const Standing> standing);
+                                  std::span<const Pose> slot_from_part, std::span<const Standing> standing,
+                                  const std::function<bool(const Placing&)>& good = {});
 
 /// Way points between two places of the tool, the last one excluded: up, across at a safe height, and above where it
 /// goes; or the taught ones. At most six.
