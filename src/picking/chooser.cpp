@@ -137,26 +137,38 @@ std::optional<Placing> Chooser::place(const Entry& held, const Filling& filling,
     if (!filling[i].empty())
       standing.push_back({&vision_.model(filling[i]), slots_[i].base_from_slot * cell_part(filling[i]).slot_from_part});
   const Held in_hand{&vision_.model(held.part), &shape(held.gripper), held.opening_mm, held.tcp_from_part};
-  auto placing = plan_place(
-      arm_with(held.gripper), in_hand, open, alike(*in_hand.part, cell_part(held.part).slot_from_part), standing,
-      [&](const Placing& p) { return way(start, p.stops[0].base_from_tcp, held.gripper).has_value(); });
+  const Pose flange_from_tcp = shape(held.gripper).gripper.flange_from_tcp;
+  const auto has_ways = [&](const Placing& p) {
+    if (!way(start, p.stops[0].base_from_tcp, held.gripper)) return false;
+    const Start after{p.stops[2].base_from_tcp * flange_from_tcp.inverse(), p.stops[2].joints};
+    return way(after, over_bin(), held.gripper).has_value();
+  };
+  auto placing = plan_place(arm_with(held.gripper), in_hand, open,
+                            alike(*in_hand.part, cell_part(held.part).slot_from_part), standing, has_ways);
   if (placing && placing->slot == &at_station) placing->slot = nullptr;
   return placing;
 }
 
 std::optional<Choice> Chooser::choose(const grasp::Plan& plan, const Filling& filling,
                                       const std::optional<Start>& start, std::vector<std::string>& why) const {
+  int no_way = 0, no_place = 0;
   for (const bool station : {false, true}) {
     if (station && !has_station()) break;
     for (const grasp::Grasp& grasp : plan.grasps) {
-      if (start && !way(*start, grasp.path.front().base_from_tcp, grasp.gripper)) continue;
+      if (start && !way(*start, grasp.path.front().base_from_tcp, grasp.gripper)) {
+        ++no_way;
+        continue;
+      }
       Entry held;
       held.part = grasp.part_name, held.gripper = grasp.gripper, held.opening_mm = grasp.opening_before_mm;
       held.tcp_from_part = grasp.part_from_tcp.inverse();
       const grasp::PathPoint& retreat = grasp.path.back();
       const Pose flange = retreat.base_from_tcp * shape(grasp.gripper).gripper.flange_from_tcp.inverse();
       auto placing = place(held, filling, {flange, retreat.joints}, !station, station);
-      if (!placing) continue;
+      if (!placing) {
+        ++no_place;
+        continue;
+      }
       Choice choice{grasp, vision_.part(grasp.part), std::move(*placing)};
       const std::vector<robot::Refusal> refusals = refusals_of(choice, 0);
       if (refusals.empty()) return choice;
@@ -164,6 +176,8 @@ std::optional<Choice> Chooser::choose(const grasp::Plan& plan, const Filling& fi
         if (std::find(why.begin(), why.end(), refusal.message) == why.end()) why.push_back(refusal.message);
     }
   }
+  if (no_way > 0) why.push_back(std::to_string(no_way) + " times no way to the grasp from where the arm stands");
+  if (no_place > 0) why.push_back(std::to_string(no_place) + " times no way for its part into a slot");
   return {};
 }
 
@@ -187,6 +201,14 @@ std::vector<robot::Refusal> Chooser::refusals_of(const Choice& choice, double sc
   for (robot::Refusal& refusal : robot::refusals(facts, limits_))
     if (of_motion(refusal.code)) out.push_back(std::move(refusal));
   return out;
+}
+
+Pose Chooser::over_bin() const {
+  Pose pose = Pose::Identity();
+  pose.linear() = rotation_from_vector(Vec3(kPi, 0, 0));  // the tool looks down
+  if (cell_.bin) pose.translation() = cell_.bin->base_from_bin.translation();
+  pose.translation().z() = travel_mm();
+  return pose;
 }
 
 double Chooser::travel_mm() const {

@@ -52,6 +52,7 @@ class Chooser {
   const CellPart& cell_part(const std::string& name) const;
   Pose station_pose(const std::string& part) const;
   bool has_station() const { return cell_.regrasp.has_value(); }
+  Pose over_bin() const;  ///< the tool above the bin, at the height of its ways
   /// The TCP's height at which nothing is in the way.
   double travel_mm() const;
   /// Reasons of software against the motion, the controller's state aside.

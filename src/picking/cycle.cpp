@@ -266,7 +266,8 @@ Phase Run::push() {
     std::vector<Pose> poses;
     for (const grasp::PathPoint& point : push.path) poses.push_back(point.base_from_tcp);
     const auto stops = stops_at(arm, poses);
-    if (!stops || stops->size() > 6) continue;
+    constexpr std::size_t kMostStops = 6;  // of one command
+    if (!stops || stops->size() > kMostStops || !chooser_.way(here(), poses.front(), push.gripper)) continue;
     travel(poses.front(), push.gripper);
     Entry entry;
     entry.event = Event::move_ordered;

@@ -163,6 +163,11 @@ int main(int argc, char** argv) try {
                 static_cast<unsigned long long>(options.seed), placed, truth.parts.size(), truth.grips,
                 truth.collisions.size(), truth.simulated_s, end.status.c_str(), end.message.c_str());
     if (verbose)
+      for (const sim::PartTruth& part : truth.parts)
+        if (part.where == sim::Whereabouts::placed)
+          std::printf("    %s in slot %d: %.2f mm, %.2f deg off\n", part.part.c_str(), part.slot, part.off_mm,
+                      part.off_rad / kDegree);
+    if (verbose)
       for (const sim::CellCollision& c : truth.collisions)
         std::printf("    collision at %.1f s, cycle %d: %s, %.2f mm\n", c.time_s, c.cycle, c.what.c_str(), c.depth_mm);
     std::fflush(stdout);
