@@ -79,13 +79,17 @@ Fields<GivenSlot> given_slot_fields() {
                       "names of the parts that may stand in it; none: as the sequence says");
 }
 
-std::vector<Pose> read_way_points(const TomlPlace& place) {
-  constexpr const char* kWanted = "a list of at most 6 poses";  // as many as the hand-shake takes at once
-  const std::size_t count = place.array_size(kWanted);
-  if (count > 6) place.fail(kWanted);
+std::vector<Pose> read_poses(const TomlPlace& place) {
+  const std::size_t count = place.array_size("a list of poses");
   std::vector<Pose> out;
   for (std::size_t i = 0; i < count; ++i) out.push_back(read_pose(place.at(i)));
   return out;
+}
+
+std::vector<Pose> read_way_points(const TomlPlace& place) {
+  constexpr const char* kWanted = "a list of at most 6 poses";  // as many as the hand-shake takes at once
+  if (place.array_size(kWanted) > 6) place.fail(kWanted);
+  return read_poses(place);
 }
 
 Fields<CellController> controller_fields() {
@@ -178,7 +182,9 @@ Fields<CellPart> part_fields() {
   fields.number("max_tilt_deg", "deg", {0, 180}, &CellPart::max_tilt_rad, "of the approach to the vertical", kDegree);
   fields.list("pick_points", pick_point_fields(), &CellPart::pick_points,
               "where to grip; none: grasps are found from its surfaces");
-  add_pose(fields, "slot_from_part", &CellPart::slot_from_part, "how it stands in a slot");
+  add_pose(fields, "slot_from_part", &CellPart::slot_from_part, "how it stands in a slot, and at the station");
+  fields.value("station_from_part", "", "list of poses", "[]", &CellPart::station_from_part,
+               "other ways in which the station holds it, on its side for one: to turn it over", read_poses);
   return fields.check([](const TomlPlace& place, const CellPart& part) { must_have_name(place, part.name); });
 }
 

@@ -73,10 +73,6 @@ ArmWithTool Chooser::arm_with(const std::string& gripper) const {
   return arm;
 }
 
-Pose Chooser::station_pose(const std::string& part) const {
-  return cell_.regrasp->base_from_station * cell_part(part).slot_from_part;
-}
-
 Places Chooser::places(const Filling& filling) const {
   Places out;
   for (const CellPart& part : cell_.parts) {
@@ -87,8 +83,8 @@ Places Chooser::places(const Filling& filling) const {
         poses.push_back(pose);
     }
     if (poses.empty()) continue;  // no slot waits for it
-    if (has_station())
-      for (const Pose& pose : alike(vision_.model(part.name), station_pose(part.name))) poses.push_back(pose);
+    for (const Pose& stands : station_poses(cell_, part))
+      for (const Pose& pose : alike(vision_.model(part.name), stands)) poses.push_back(pose);
     out[part.name] = std::move(poses);
   }
   return out;
@@ -115,22 +111,32 @@ std::optional<std::vector<Stop>> Chooser::way(const Start& start, const Pose& ba
                                               const std::string& gripper) const {
   ArmWithTool arm = arm_with(gripper);
   arm.singularity = 0;  // these are moves of the joints
-  return stops_at(arm,
-                  way_between(start.base_from_flange * arm.flange_from_tcp, base_from_tcp, travel_mm(),
-                              cell_.robots.front().way_points),
-                  start.joints, false);
+  const Pose from = start.base_from_flange * arm.flange_from_tcp;
+  const Vec3 bin = cell_.bin ? cell_.bin->base_from_bin.translation() : base_from_tcp.translation();
+  auto stops = stops_at(arm, way_between(from, base_from_tcp, travel_mm(), cell_.robots.front().way_points, bin),
+                        start.joints, false);
+  if (!stops || stops->empty() || !cell_.bin) return stops;
+  // Where the arm begins is not known at the very start: then its first stop is taken for it.
+  const Stop begin = start.joints ? Stop{from, *start.joints} : stops->front();
+  if (!arm_is_clear(arm, begin, *stops, bodies_of(*cell_.bin))) return {};
+  return stops;
 }
 
-std::optional<Placing> Chooser::place(const Entry& held, const Filling& filling, const Start& start, bool slots,
-                                      bool station) const {
+std::optional<Placing> Chooser::place(const Entry& held, const Filling& filling, const Start& start,
+                                      Where where) const {
+  const CellPart& part = cell_part(held.part);
   std::vector<const Slot*> open;
-  if (slots)
+  std::vector<Pose> stands;
+  Slot station;
+  if (where == Where::slots) {
     for (const Slot* slot : open_slots(slots_, filling, cell_.rack->when_missing))
       if (may_stand(*slot, held.part)) open.push_back(slot);
-  Slot at_station;
-  if (station && has_station()) {
-    at_station.base_from_slot = cell_.regrasp->base_from_station;
-    open.push_back(&at_station);
+    stands = alike(vision_.model(held.part), part.slot_from_part);
+  } else if (has_station()) {
+    station.base_from_slot = cell_.regrasp->base_from_station;
+    open.push_back(&station);
+    for (const Pose& pose : where == Where::station ? std::vector<Pose>{part.slot_from_part} : part.station_from_part)
+      for (const Pose& same : alike(vision_.model(held.part), pose)) stands.push_back(same);
   }
   std::vector<Standing> standing;
   for (std::size_t i = 0; i < filling.size(); ++i)
@@ -143,17 +149,16 @@ std::optional<Placing> Chooser::place(const Entry& held, const Filling& filling,
     const Start after{p.stops[2].base_from_tcp * flange_from_tcp.inverse(), p.stops[2].joints};
     return way(after, over_bin(), held.gripper).has_value();
   };
-  auto placing = plan_place(arm_with(held.gripper), in_hand, open,
-                            alike(*in_hand.part, cell_part(held.part).slot_from_part), standing, has_ways);
-  if (placing && placing->slot == &at_station) placing->slot = nullptr;
+  auto placing = plan_place(arm_with(held.gripper), in_hand, open, stands, standing, has_ways);
+  if (placing && placing->slot == &station) placing->slot = nullptr;
   return placing;
 }
 
 std::optional<Choice> Chooser::choose(const grasp::Plan& plan, const Filling& filling,
                                       const std::optional<Start>& start, std::vector<std::string>& why) const {
   int no_way = 0, no_place = 0;
-  for (const bool station : {false, true}) {
-    if (station && !has_station()) break;
+  for (const Where where : {Where::slots, Where::station, Where::turned}) {
+    if (where != Where::slots && !has_station()) break;
     for (const grasp::Grasp& grasp : plan.grasps) {
       if (start && !way(*start, grasp.path.front().base_from_tcp, grasp.gripper)) {
         ++no_way;
@@ -164,7 +169,7 @@ std::optional<Choice> Chooser::choose(const grasp::Plan& plan, const Filling& fi
       held.tcp_from_part = grasp.part_from_tcp.inverse();
       const grasp::PathPoint& retreat = grasp.path.back();
       const Pose flange = retreat.base_from_tcp * shape(grasp.gripper).gripper.flange_from_tcp.inverse();
-      auto placing = place(held, filling, {flange, retreat.joints}, !station, station);
+      auto placing = place(held, filling, {flange, retreat.joints}, where);
       if (!placing) {
         ++no_place;
         continue;

@@ -33,16 +33,18 @@ class Chooser {
     Pose base_from_flange = Pose::Identity();
     std::optional<robot::Joints> joints;
   };
-  /// The best grasp that the arm gets to, and whose part can go into a slot; failing that, one whose part can go to the
-  /// station.
+  /// The best grasp that the arm gets to, and whose part can go into a slot; failing that, to the station.
   /// \param start  none: not known yet
   /// \param why    gets what software refuses
   std::optional<Choice> choose(const grasp::Plan& plan, const Filling& filling, const std::optional<Start>& start,
                                std::vector<std::string>& why) const;
-  /// The first open slot for a part that is held like this; failing that, the station where that is asked for.
-  /// \param start  where its way begins
-  std::optional<Placing> place(const Entry& held, const Filling& filling, const Start& start, bool slots,
-                               bool station) const;
+  enum class Where {
+    slots,    ///< the open ones
+    station,  ///< as in a slot
+    turned,   ///< at the station in one of the other ways
+  };
+  /// The first place of that kind for a part that is held like this. \param start  where its way begins
+  std::optional<Placing> place(const Entry& held, const Filling& filling, const Start& start, Where where) const;
   /// The stops of a way; none where it is out of reach.
   std::optional<std::vector<Stop>> way(const Start& start, const Pose& base_from_tcp, const std::string& gripper) const;
 
@@ -50,7 +52,6 @@ class Chooser {
   const grasp::GripperShape& shape(const std::string& gripper) const;
   int tool_of(const std::string& gripper) const;  ///< number on the controller, from 1 in the file's order
   const CellPart& cell_part(const std::string& name) const;
-  Pose station_pose(const std::string& part) const;
   bool has_station() const { return cell_.regrasp.has_value(); }
   Pose over_bin() const;  ///< the tool above the bin, at the height of its ways
   /// The TCP's height at which nothing is in the way.

@@ -9,11 +9,13 @@
 namespace tribin::picking {
 namespace {
 
-constexpr int kScansRemembered = 3;  // a grasp that failed is not tried again in so many
-constexpr int kMostPushes = 5;       // in a row, without a pick
-constexpr int kMostFailures = 10;    // grips in a row that held nothing: something else is wrong
-constexpr int kPushClass = 255;      // B002 of a push, for jobs that close the jaws then
-constexpr double kClosed_mm = 0.1;   // an opening that is said, and closed
+constexpr int kScansRemembered = 3;       // a grasp that failed is not tried again in so many
+constexpr int kMostPushes = 5;            // in a row, without a pick
+constexpr int kMostFailures = 10;         // grips in a row that held nothing: something else is wrong
+constexpr int kMostTurns = 3;             // at the station, of one part
+constexpr double kTurned = 45 * kDegree;  // a part that is put back as it stood gains nothing
+constexpr int kPushClass = 255;           // B002 of a push, for jobs that close the jaws then
+constexpr double kClosed_mm = 0.1;        // an opening that is said, and closed
 
 class Stopwatch {
  public:
@@ -184,6 +186,7 @@ Phase Run::pick() {
   report_.base_from_part = choice.part.base_from_part;
   report_.base_from_tcp = grasp.at(grasp::Step::pick)->base_from_tcp;
   report_.score = grasp.score, report_.terms = grasp.terms;
+  turns_ = 0;
   const bool held = carry_out_pick(choice, scene_);
   if (held) {
     failures_ = pushes_ = 0;
@@ -199,7 +202,9 @@ Phase Run::pick() {
 
 Phase Run::place() {
   const Entry held = *now().in_hand;
-  const auto placing = chooser_.place(held, now().filling, here(), true, true);
+  std::optional<Placing> placing;
+  for (const Chooser::Where where : {Chooser::Where::slots, Chooser::Where::station, Chooser::Where::turned})
+    if (!placing) placing = chooser_.place(held, now().filling, here(), where);
   if (!placing) return in_doubt("the gripper holds " + held.part + ", and no open slot can be reached with it");
   travel(placing->stops[0].base_from_tcp, held.gripper);
   Entry entry = held;
@@ -234,26 +239,33 @@ Phase Run::regrasp() {
     return finish("not_pickable",
                   standing.part + " stands at the station and " + why + "; take it away, then say --slot-is empty");
   };
-  for (const grasp::Grasp& grasp : plan.grasps) {
-    Entry held = standing;
-    held.gripper = grasp.gripper, held.opening_mm = grasp.opening_before_mm;
-    held.tcp_from_part = grasp.part_from_tcp.inverse();
-    const Pose flange =
-        grasp.path.back().base_from_tcp * chooser_.shape(grasp.gripper).gripper.flange_from_tcp.inverse();
-    const auto placing = chooser_.place(held, now().filling, {flange, grasp.path.back().joints}, true, false);
-    if (!placing || !chooser_.way(here(), grasp.path.front().base_from_tcp, grasp.gripper)) continue;
-    Choice choice;
-    choice.grasp = grasp;
-    choice.part.base_from_part = standing.base_from_part;
-    choice.placing = *placing;
-    if (carry_out_pick(choice, standing.scene)) {
-      failures_ = 0;
-      return Phase::place;
+  // To a slot; or, where it stands turned over, to where it stands as in a slot.
+  for (const Chooser::Where where : {Chooser::Where::slots, Chooser::Where::station, Chooser::Where::turned})
+    for (const grasp::Grasp& grasp : plan.grasps) {
+      Entry held = standing;
+      held.gripper = grasp.gripper, held.opening_mm = grasp.opening_before_mm;
+      held.tcp_from_part = grasp.part_from_tcp.inverse();
+      const Pose flange =
+          grasp.path.back().base_from_tcp * chooser_.shape(grasp.gripper).gripper.flange_from_tcp.inverse();
+      if (!chooser_.way(here(), grasp.path.front().base_from_tcp, grasp.gripper)) continue;
+      const auto placing = chooser_.place(held, now().filling, {flange, grasp.path.back().joints}, where);
+      if (!placing) continue;
+      if (where != Chooser::Where::slots) {
+        const Pose turn = placing->base_from_part.inverse() * standing.base_from_part;
+        if (rotation_angle(turn.linear(), Matrix3::Identity()) < kTurned || ++turns_ > kMostTurns) continue;
+      }
+      Choice choice;
+      choice.grasp = grasp;
+      choice.part.base_from_part = standing.base_from_part;
+      choice.placing = *placing;
+      if (carry_out_pick(choice, standing.scene)) {
+        failures_ = 0;
+        return Phase::place;
+      }
+      failed_.push_back({{grasp.at(grasp::Step::pick)->base_from_tcp, grasp.gripper}, scene_});
+      tell("missed", "at the station");
+      return ++failures_ >= kMostFailures ? give_up("is not gripped") : Phase::regrasp;
     }
-    failed_.push_back({{grasp.at(grasp::Step::pick)->base_from_tcp, grasp.gripper}, scene_});
-    tell("missed", "at the station");
-    return ++failures_ >= kMostFailures ? give_up("is not gripped") : Phase::regrasp;
-  }
   return give_up("no grasp leads from there to a slot (" + counted(plan.reasons) + ")");
 }
 

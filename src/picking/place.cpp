@@ -93,13 +93,15 @@ std::optional<Placing> plan_place(const ArmWithTool& arm, const Held& held, std:
   return {};
 }
 
-std::vector<Pose> way_between(const Pose& from, const Pose& to, double travel_mm, std::span<const Pose> taught) {
+std::vector<Pose> way_between(const Pose& from, const Pose& to, double travel_mm, std::span<const Pose> taught,
+                              const Vec3& keep_still) {
   std::vector<Pose> way;
+  const auto away = [](const Pose& pose, const Vec3& point) { return (pose.translation() - point).norm(); };
   if (!taught.empty()) {
     // From the end that is nearer: the same points lead to the rack and back.
     way.assign(taught.begin(), taught.end());
-    const auto away = [&from](const Pose& pose) { return (pose.translation() - from.translation()).norm(); };
-    if (away(way.back()) < away(way.front())) std::reverse(way.begin(), way.end());
+    if (away(way.back(), from.translation()) < away(way.front(), from.translation()))
+      std::reverse(way.begin(), way.end());
     return way;
   }
   const auto raised = [travel_mm](Pose pose) {
@@ -107,9 +109,65 @@ std::vector<Pose> way_between(const Pose& from, const Pose& to, double travel_mm
     return pose;
   };
   constexpr double kThere_mm = 1;
-  if (from.translation().z() < travel_mm - kThere_mm) way.push_back(raised(from));
-  if (to.translation().z() < travel_mm - kThere_mm) way.push_back(raised(to));
+  const Pose above_from = raised(from), above_to = raised(to);
+  if (from.translation().z() < travel_mm - kThere_mm) way.push_back(above_from);
+  const bool turn_at_start = away(from, keep_still) > away(to, keep_still);
+  Pose turned = turn_at_start ? above_from : above_to;
+  turned.linear() = turn_at_start ? to.linear() : from.linear();
+  if (rotation_angle(from.linear(), to.linear()) > kDegree) way.push_back(turned);
+  if (to.translation().z() < travel_mm - kThere_mm) way.push_back(above_to);
   return way;
+}
+
+bool arm_is_clear(const ArmWithTool& arm, const Stop& from, std::span<const Stop> way,
+                  std::span<const grasp::Convex> bodies) {
+  constexpr double kStep_mm = 60, kStep = 10 * kDegree;  // between looks: less than the links are thick
+  const Pose arm_from_base = base_from_arm(*arm.robot, *arm.arm).inverse();
+  const auto clear = [&](const robot::Joints& joints) {
+    for (const grasp::Convex& link : grasp::arm_bodies(*arm.robot, *arm.arm, 0, joints))
+      if (!clear_of(link, bodies, kClear_mm)) return false;
+    return true;
+  };
+  Stop last = from;
+  for (const Stop& stop : way) {
+    const Vec3 move = stop.base_from_tcp.translation() - last.base_from_tcp.translation();
+    const Vec3 turn = vector_from_rotation(stop.base_from_tcp.linear() * last.base_from_tcp.linear().transpose());
+    const int steps = 1 + static_cast<int>(std::max(move.norm() / kStep_mm, turn.norm() / kStep));
+    robot::ReachOptions options;
+    options.from = last.joints;
+    for (int i = 1; i <= steps; ++i) {
+      const double share = static_cast<double>(i) / steps;
+      robot::Joints joints{};
+      for (std::size_t k = 0; k < joints.size(); ++k) joints[k] = (1 - share) * last.joints[k] + share * stop.joints[k];
+      if (!clear(joints)) return false;
+      Pose pose = last.base_from_tcp;
+      pose.translation() += share * move;
+      pose.linear() = rotation_from_vector(share * turn) * last.base_from_tcp.linear();
+      const auto reached = reach(*arm.arm, arm_from_base * pose * arm.flange_from_tcp.inverse(), options);
+      if (!reached) continue;  // a move of the joints does not come there
+      if (!clear(reached->joints)) return false;
+      options.from = reached->joints;
+    }
+    last = stop;
+  }
+  return true;
+}
+
+std::vector<grasp::Convex> bodies_of(const CellBin& bin) {
+  const Vec3& size = bin.inner_size_mm;
+  const double wall = bin.wall_mm, x = (size.x() + wall) / 2, y = (size.y() + wall) / 2, z = size.z() / 2;
+  std::vector<grasp::Convex> bodies;
+  const auto add = [&](const Vec3& center, const Vec3& sides) {
+    Pose pose = bin.base_from_bin;
+    pose.translation() = bin.base_from_bin * center;
+    bodies.push_back(grasp::make_box(pose, sides));
+  };
+  add(Vec3(0, 0, -wall / 2), Vec3(size.x(), size.y(), wall));
+  for (const double side : {-1.0, 1.0}) {
+    add(Vec3(side * x, 0, z), Vec3(wall, size.y(), size.z()));
+    add(Vec3(0, side * y, z), Vec3(size.x(), wall, size.z()));
+  }
+  return bodies;
 }
 
 }  // namespace tribin::picking

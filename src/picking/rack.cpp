@@ -40,6 +40,13 @@ std::vector<Slot> slots_of(const Rack& rack) {
   return slots;
 }
 
+std::vector<Pose> station_poses(const WorkCell& cell, const CellPart& part) {
+  if (!cell.regrasp) return {};
+  std::vector<Pose> poses{cell.regrasp->base_from_station * part.slot_from_part};
+  for (const Pose& pose : part.station_from_part) poses.push_back(cell.regrasp->base_from_station * pose);
+  return poses;
+}
+
 bool may_stand(const Slot& slot, const std::string& part) {
   return slot.parts.empty() || std::find(slot.parts.begin(), slot.parts.end(), part) != slot.parts.end();
 }

@@ -48,7 +48,7 @@ class Run {
   std::optional<Choice> choice_;
   CycleReport report_;
   Resort resort_ = Resort::none;
-  int scene_ = 0, pushes_ = 0, failures_ = 0;
+  int scene_ = 0, pushes_ = 0, failures_ = 0, turns_ = 0;
   double scan_s_ = 0;
   struct Failed {
     grasp::FailedPick pick;

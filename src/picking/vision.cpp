@@ -10,7 +10,8 @@
 namespace tribin::picking {
 namespace {
 
-constexpr int kTurns = 24;  // of a round part: 15 deg, what a jaw's width forgives
+constexpr double kSettled = 0.3 * kDegree;  // sd of how a part turns while it is gripped and let go
+constexpr int kTurns = 24;                  // of a round part: 15 deg, what a jaw's width forgives
 
 class CameraVision : public Vision {
  public:
@@ -56,6 +57,12 @@ class CameraVision : public Vision {
     grasp::PartHere here;
     here.part = &known(part);
     here.base_from_part = base_from_part;
+    // It was gripped, carried and let go since it was measured.
+    const double robot = from_.cell->robots.front().sigma_mm, turn = kSettled;
+    double slip = 0;
+    for (const Gripper& gripper : from_.cell->grippers) slip = std::max(slip, gripper.slip_mm);
+    const double place = robot * robot + slip * slip;
+    here.covariance.diagonal() << place, place, place, turn * turn, turn * turn, turn * turn;
     scene.parts.push_back(here);
     add_places(scene, places);
     return grasp::plan_grasps(scene, options);

@@ -8,6 +8,7 @@
 #include "tribin/core/error.hpp"
 #include "tribin/grasp/grasp.hpp"
 #include "tribin/kinematics/inverse.hpp"
+#include "tribin/picking/place.hpp"
 
 namespace tribin::sim {
 namespace {
@@ -139,22 +140,24 @@ void CellWorld::place_bodies(Tool& tool) {
   if (held_ >= 0) heap_->move(held_, bin_from_tcp * tcp_from_held_);
 }
 
+/// A command says how far the jaws are to be open: I003, in tenths of a millimetre; 0 = as far as they go.
+void CellWorld::set_opening(Tool& tool, const controller_sim::Machine& machine) {
+  if (tool.shape.jaws == 0) return;
+  const auto said = machine.integers.find(3);
+  const double low = tool.shape.stroke_min(), high = tool.shape.stroke_max();
+  const double wanted = said == machine.integers.end() ? 0 : said->second / 10.0;
+  tool.opening_mm = wanted > 0 ? std::clamp(wanted, low, high) : tool.shape.inside ? low : high;
+}
+
 void CellWorld::follow(const controller_sim::Machine& machine) {
   Tool& tool = tool_of(machine);
   const auto taken = machine.integers.find(1);
   const int cycle = taken == machine.integers.end() ? 0 : taken->second;
   if (cycle != cycle_) {
     cycle_ = cycle;
-    // A command that picks says how far the jaws are to be opened: I003, in tenths of a millimetre.
-    const auto opening = machine.integers.find(3);
     const auto command = machine.bytes.find(0);
-    if (held_ < 0 && tool.shape.jaws > 0 && command != machine.bytes.end() && command->second == 1) {
-      const double wanted = opening == machine.integers.end() ? 0 : opening->second / 10.0;
-      tool.opening_mm = std::clamp(wanted > 0          ? wanted
-                                   : tool.shape.inside ? tool.shape.stroke_min()
-                                                       : tool.shape.stroke_max(),
-                                   tool.shape.stroke_min(), tool.shape.stroke_max());
-    }
+    const bool picks = command != machine.bytes.end() && command->second == 1;
+    if (held_ < 0 && (picks || in_push(machine))) set_opening(tool, machine);
   }
   base_from_tcp_ = true_tcp(machine);
   truth_.simulated_s = machine.now_s();
@@ -220,23 +223,12 @@ void CellWorld::find_arm_contacts(int tool, const controller_sim::Machine& machi
                                cell_.grippers[static_cast<std::size_t>(tool)].flange_from_tcp.inverse();
   robot::ReachOptions options;
   options.from = joints_;
+  constexpr int kForm = 7;  // flip, elbow and back, as the command says
+  options.form = machine.position().type & kForm;
   const auto reached = reach(arm_, arm_from_flange, options);
   if (!reached) return;  // a move of the joints does not follow the straight line that is taken here
   joints_ = reached->joints;
-  const Vec3 size = inner_size(cell_);
-  const double wall = cell_.bin->wall_mm;
-  std::vector<grasp::Convex> bin;
-  const auto add = [&](const Vec3& center, const Vec3& sides) {
-    Pose pose = base_from_bin_;
-    pose.translation() = base_from_bin_ * center;
-    bin.push_back(grasp::make_box(pose, sides));
-  };
-  const double x = (size.x() + wall) / 2, y = (size.y() + wall) / 2, z = size.z() / 2;
-  add(Vec3(0, 0, -wall / 2), Vec3(size.x(), size.y(), wall));
-  for (const double side : {-1.0, 1.0}) {
-    add(Vec3(side * x, 0, z), Vec3(wall, size.y(), size.z()));
-    add(Vec3(0, side * y, z), Vec3(size.x(), wall, size.z()));
-  }
+  const std::vector<grasp::Convex> bin = picking::bodies_of(*cell_.bin);
   int link = 0;
   for (const grasp::Convex& body : grasp::arm_bodies(robot_, arm_, 0, *joints_)) {
     ++link;
@@ -298,14 +290,7 @@ void CellWorld::open(const controller_sim::Machine& machine) {
   follow(machine);
   Tool& tool = tool_of(machine);
   const int part = std::exchange(held_, -1);
-  const auto opening = machine.integers.find(3);
-  if (tool.shape.jaws > 0) {
-    const double wanted = opening == machine.integers.end() ? 0 : opening->second / 10.0;
-    tool.opening_mm = std::clamp(wanted > 0          ? wanted
-                                 : tool.shape.inside ? tool.shape.stroke_min()
-                                                     : tool.shape.stroke_max(),
-                                 tool.shape.stroke_min(), tool.shape.stroke_max());
-  }
+  set_opening(tool, machine);
   if (part < 0) return;
   PartTruth& truth = truth_.parts[part];
   const Pose& slot_from_part = cell_.parts[class_of_[part]].slot_from_part;
@@ -313,7 +298,8 @@ void CellWorld::open(const controller_sim::Machine& machine) {
   const auto is_at = [&](const Pose& wanted) {
     return (wanted.translation() - here.translation()).norm() < kInSlot_mm;
   };
-  if (cell_.regrasp && is_at(cell_.regrasp->base_from_station * slot_from_part)) {
+  for (const Pose& stands : picking::station_poses(cell_, cell_.parts[class_of_[part]])) {
+    if (!is_at(stands)) continue;
     truth.where = Whereabouts::at_station;
     heap_->stand(part);
     return;

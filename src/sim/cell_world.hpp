@@ -52,6 +52,7 @@ class CellWorld {
   void drop_parts(const SimulatedCellOptions& options);
   void add_tools(const WorkCell& cell);
   Pose true_tcp(const controller_sim::Machine& machine) const;
+  void set_opening(Tool& tool, const controller_sim::Machine& machine);
   Tool& tool_of(const controller_sim::Machine& machine);
   void place_bodies(Tool& tool);
   void find_contacts(const Tool& tool, const controller_sim::Machine& machine);

@@ -82,7 +82,8 @@ struct CellPart {
   std::vector<std::string> grippers;
   double max_tilt_rad = 40 * kDegree;      ///< of the approach to the vertical
   std::vector<PickPoint> pick_points;      ///< empty = grasps are found from the part's surfaces
-  Pose slot_from_part = Pose::Identity();  ///< how it stands in a slot
+  Pose slot_from_part = Pose::Identity();  ///< how it stands in a slot, and at the station
+  std::vector<Pose> station_from_part;     ///< other ways in which the station holds it: to turn it over
 };
 
 struct RackSlots {

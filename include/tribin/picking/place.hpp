@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "tribin/grasp/grasp.hpp"
 #include "tribin/grasp/gripper_shape.hpp"
 #include "tribin/kinematics/inverse.hpp"
 #include "tribin/part/part.hpp"
@@ -65,8 +66,17 @@ std::optional<Placing> plan_place(const ArmWithTool& arm, const Held& held, std:
                                   const std::function<bool(const Placing&)>& good = {});
 
 /// Way points between two places of the tool, the last one excluded: up, across at a safe height, and above where it
-/// goes; or the taught ones. At most six.
+/// goes; or the taught ones. At most six. The tool turns at one end only, the one that is farther from `keep_still`
+/// (the bin: a tool that turns over it sweeps its walls).
 /// \param travel_mm  the safe height of the TCP
-std::vector<Pose> way_between(const Pose& from, const Pose& to, double travel_mm, std::span<const Pose> taught);
+std::vector<Pose> way_between(const Pose& from, const Pose& to, double travel_mm, std::span<const Pose> taught,
+                              const Vec3& keep_still);
+
+/// Whether an arm's links keep clear of bodies on a way, taken straight in space as well as straight in the joints.
+bool arm_is_clear(const ArmWithTool& arm, const Stop& from, std::span<const Stop> way,
+                  std::span<const grasp::Convex> bodies);
+
+/// Floor and walls of a bin, base frame.
+std::vector<grasp::Convex> bodies_of(const CellBin& bin);
 
 }  // namespace tribin::picking

@@ -22,6 +22,9 @@ struct Slot {
 /// begins anew where it ends.
 std::vector<Slot> slots_of(const Rack& rack);
 
+/// Where a part may stand at the station: first as in a slot, then in the other ways. Empty without a station.
+std::vector<Pose> station_poses(const WorkCell& cell, const CellPart& part);
+
 bool may_stand(const Slot& slot, const std::string& part);
 
 /// "slot 7 (alternator_a)": for people.
