@@ -13,6 +13,8 @@ namespace {
 constexpr float kUnknown = std::numeric_limits<float>::infinity();
 // Blocks are as wide as the clearance that grippers are given.
 constexpr double kBlock_mm = 2.5;
+// Blocks of a finger's thickness, 15 mm: what stands beside a hole may go on for that much in it.
+constexpr int kFinger = 6;
 // A measurement that near to where the part should be is the part: noise and pose are some tenths, systematic errors
 // of large scans a millimetre or two.
 constexpr double kOwn_mm = 3;
@@ -60,7 +62,8 @@ DepthSpace::DepthSpace(const Scan& scan, const Pose& base_from_camera) {
         }
       raw_[static_cast<std::size_t>(v) * width_ + u] = seen > 2 ? second : first;
     }
-  fill_and_build();
+  fill({0, 0, width_, height_});
+  build();
 }
 
 void DepthSpace::build() {
@@ -80,16 +83,44 @@ void DepthSpace::build() {
   }
 }
 
-void DepthSpace::fill_and_build() {
+void DepthSpace::fill(const Window& w) {
   levels_.assign(1, Level{width_, height_, raw_});
   build();
-  // A hole takes the nearest depth of the smallest cell around it that has any.
-  for (int v = 0; v < height_; ++v)
-    for (int u = 0; u < width_; ++u) {
-      float& z = levels_[0].z[static_cast<std::size_t>(v) * width_ + u];
-      for (std::size_t k = 1; k < levels_.size() && z == kUnknown; ++k) z = levels_[k].at(u >> k, v >> k);
+  // How many blocks it is to the nearest measurement, along rows, columns and diagonals: there and back again.
+  const int wide = w.u1 - w.u0, high = w.v1 - w.v0;
+  std::vector<int> away(static_cast<std::size_t>(wide) * high, 0);
+  const auto at = [&](int u, int v) -> int& { return away[static_cast<std::size_t>(v) * wide + u]; };
+  const auto nearer = [&](int u, int v, int du, int dv) {
+    if (u + du >= 0 && u + du < wide && v + dv >= 0 && v + dv < high)
+      at(u, v) = std::min(at(u, v), at(u + du, v + dv) + 1);
+  };
+  for (int v = 0; v < high; ++v)
+    for (int u = 0; u < wide; ++u) {
+      if (levels_[0].at(w.u0 + u, w.v0 + v) == kUnknown) at(u, v) = width_ + height_;
+      for (const auto& [du, dv] : {std::pair{-1, 0}, {-1, -1}, {0, -1}, {1, -1}}) nearer(u, v, du, dv);
     }
-  build();
+  for (int v = high - 1; v >= 0; --v)
+    for (int u = wide - 1; u >= 0; --u)
+      for (const auto& [du, dv] : {std::pair{1, 0}, {1, 1}, {0, 1}, {-1, 1}}) nearer(u, v, du, dv);
+  std::vector<float> filled = levels_[0].z;
+  for (int v = 0; v < high; ++v)
+    for (int u = 0; u < wide; ++u)
+      if (at(u, v) > 0)
+        filled[static_cast<std::size_t>(w.v0 + v) * width_ + w.u0 + u] =
+            nearest_within(w.u0 + u, w.v0 + v, at(u, v) + kFinger);
+  levels_[0].z = std::move(filled);
+}
+
+float DepthSpace::nearest_within(int u, int v, int radius) const {
+  // Cells half as wide as the radius: they reach a little farther, and there are 25 of them at most.
+  std::size_t k = 0;
+  while (k + 1 < levels_.size() && (2 << k) < radius) ++k;
+  const Level& level = levels_[k];
+  float z = kUnknown;
+  for (int y = std::max(0, v - radius) >> k; y <= std::min(level.height - 1, (v + radius) >> k); ++y)
+    for (int x = std::max(0, u - radius) >> k; x <= std::min(level.width - 1, (u + radius) >> k); ++x)
+      z = std::min(z, level.at(x, y));
+  return z;
 }
 
 Vec3 DepthSpace::project(const Vec3& p) const {
@@ -129,7 +160,21 @@ DepthSpace DepthSpace::without(const MeshTree& tree, const Pose& base_from_part)
       out.raw_[i] = kUnknown;
       own.push_back({i, part.covers(u, v) ? static_cast<float>(1 / part.low[part.index(u, v)]) : 0.f});
     }
-  out.fill_and_build();
+  // Holes beside the part were as near as the part: they are filled anew as far as it may have mattered.
+  const std::vector<float> before = std::move(out.levels_[0].z);
+  constexpr int kBeside = 6 * kFinger;
+  const Window w{std::max(0, part.u0 - kBeside), std::max(0, part.v0 - kBeside),
+                 std::min(width_, part.u0 + part.width + kBeside), std::min(height_, part.v0 + part.height + kBeside)};
+  if (w.u0 < w.u1 && w.v0 < w.v1)
+    out.fill(w);
+  else
+    out.levels_[0].z = before;
+  for (int v = 0; v < height_; ++v)
+    for (int u = 0; u < width_; ++u)
+      if (u < w.u0 || v < w.v0 || u >= w.u1 || v >= w.v1) {
+        const std::size_t i = static_cast<std::size_t>(v) * width_ + u;
+        out.levels_[0].z[i] = before[i];
+      }
   for (const Own& o : own) out.levels_[0].z[o.index] = std::max(out.levels_[0].z[o.index], o.back);
   out.build();
   return out;

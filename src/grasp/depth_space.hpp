@@ -11,8 +11,9 @@ namespace tribin::grasp {
 /// occupied. A tree of columns over the image: each node's column holds those below it.
 class DepthSpace {
  public:
-  /// Takes the nearest surface of blocks some millimetres wide; a single stray pixel in one is none. Holes are as near
-  /// as the nearest surface at their border.
+  /// Takes the nearest surface of blocks some millimetres wide; a single stray pixel in one is none. A place in a hole
+  /// is as near as the nearest surface as far off as the hole's border and a finger's thickness more. What lies out of
+  /// the camera's view is free.
   DepthSpace(const Scan& scan, const Pose& base_from_camera);
 
   /// The same without a part: where it is what was seen, rays are free down to its far side, and down to the surface
@@ -33,8 +34,12 @@ class DepthSpace {
     float at(int u, int v) const { return z[static_cast<std::size_t>(v) * width + u]; }
   };
   Vec3 project(const Vec3& camera_point) const;  ///< to blocks, and 1 / z
-  void fill_and_build();                         ///< from raw_
-  void build();                                  ///< levels above the first
+  struct Window {
+    int u0, v0, u1, v1;  ///< blocks, ends not included
+  };
+  void fill(const Window& window);  ///< the first level's holes, from raw_
+  float nearest_within(int u, int v, int radius) const;
+  void build();  ///< levels above the first
   double column_gap(int level, int u, int v, const Convex& body, double enough) const;
 
   Pose camera_from_base_ = Pose::Identity();
