@@ -91,6 +91,13 @@ ArmPath joined(const std::vector<std::vector<Joints>>& back, const Joints& pick,
   return path;
 }
 
+/// Controllers are told the form with each position, and refuse a straight move from one to another.
+bool one_form(const robot::Arm& arm, const ArmPath& path) {
+  const int form = form_bits(arm, path.along[path.at_points[0]]) & 7;
+  return std::all_of(path.at_points.begin(), path.at_points.end(),
+                     [&](std::size_t i) { return (form_bits(arm, path.along[i]) & 7) == form; });
+}
+
 }  // namespace
 
 ArmPathResult follow(const ArmHere& here, const Pose& flange_from_tcp, const std::vector<Pose>& path, std::size_t pick,
@@ -115,7 +122,13 @@ ArmPathResult follow(const ArmHere& here, const Pose& flange_from_tcp, const std
     double turn = 0;
     if (walk(follower, path, pick, -1, back, best->joints, turn) &&
         walk(follower, path, pick, 1, forth, best->joints, turn)) {
-      result.path = joined(back, best->joints, forth);
+      ArmPath path = joined(back, best->joints, forth);
+      if (!one_form(arm, path)) {
+        result.why = Why::form;
+        result.value = result.limit = 0;
+        continue;
+      }
+      result.path = std::move(path);
       result.path->limit_term = best->limit_term;
       result.path->singularity_term = best->singularity_term;
       result.path->margins = best->margins;

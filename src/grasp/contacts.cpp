@@ -7,8 +7,10 @@
 namespace tribin::grasp {
 namespace {
 
-// A pad is felt by that many rays across and along; a cup by rings of that many.
-constexpr int kAcross = 5, kAlong = 7, kRound = 12;
+// A pad is felt by rays from edge to edge, at first a few, then one every 3.5 mm: between two of those a round of 20 mm
+// rises by 0.08 mm. A cup by rings of twelve.
+constexpr int kFew = 5, kMost = 25, kRound = 12;
+constexpr double kPitch_mm = 3.5;
 // What lies within that of the first touch touches too: pads and parts give way by some tenths of a millimetre.
 constexpr double kGivesWay_mm = 0.5;
 // Three jaws that close together push a part that is not in their middle: by that much it is no matter.
@@ -20,10 +22,18 @@ struct JawTouch {
   double distance = 0;  ///< of the first touch from the TCP's axis
   Vec3 center = Vec3::Zero(), normal = Vec3::Zero();
   int rays = 0;
+  double area_mm2 = 0;
 };
 
+/// How many rays feel a length.
+int rays_over(double length_mm, bool finely) {
+  return finely ? std::clamp(static_cast<int>(std::ceil(length_mm / kPitch_mm)) + 1, kFew, kMost) : kFew;
+}
+
 /// What one jaw meets first. \param k  which
-std::optional<JawTouch> touch_of(const MeshTree& tree, const GripperShape& g, const Pose& part_from_tcp, int k) {
+std::optional<JawTouch> touch_of(const MeshTree& tree, const GripperShape& g, const Pose& part_from_tcp, int k,
+                                 bool finely) {
+  const int across_count = rays_over(g.pad.width_mm, finely), along_count = rays_over(g.pad.length_mm, finely);
   const double angle = k * 2 * kPi / g.jaws, far = g.stroke_max() / 2 + kPushed_mm;
   const Vec3 outward = part_from_tcp.linear() * Vec3(std::cos(angle), std::sin(angle), 0);
   const Vec3 across = part_from_tcp.linear() * Vec3(-std::sin(angle), std::cos(angle), 0);
@@ -35,10 +45,10 @@ std::optional<JawTouch> touch_of(const MeshTree& tree, const GripperShape& g, co
   };
   std::vector<Felt> felt;
   double first = 1e300;
-  for (int i = 0; i < kAcross; ++i)
-    for (int j = 0; j < kAlong; ++j) {
-      const double y = g.pad.width_mm * ((i + 0.5) / kAcross - 0.5);
-      const double z = g.pad.tip_mm - g.pad.length_mm * (j + 0.5) / kAlong;
+  for (int i = 0; i < across_count; ++i)
+    for (int j = 0; j < along_count; ++j) {
+      const double y = g.pad.width_mm * (double(i) / (across_count - 1) - 0.5);
+      const double z = g.pad.tip_mm - g.pad.length_mm * j / (along_count - 1);
       Vec3 from = part_from_tcp.translation() + y * across + z * along;
       if (!g.inside) from += far * outward;
       const auto hit = tree.first_hit(from, direction, far);
@@ -56,6 +66,7 @@ std::optional<JawTouch> touch_of(const MeshTree& tree, const GripperShape& g, co
     ++touch.rays;
   }
   touch.center /= touch.rays;
+  touch.area_mm2 = touch.rays * (g.pad.width_mm / across_count) * (g.pad.length_mm / along_count);
   touch.normal.normalize();
   return touch;
 }
@@ -64,22 +75,24 @@ double angle_between(const Vec3& a, const Vec3& b) { return std::acos(std::clamp
 
 }  // namespace
 
-std::optional<Contacts> close_jaws(const MeshTree& tree, const GripperShape& g, const Pose& part_from_tcp) {
+std::optional<Contacts> close_jaws(const MeshTree& tree, const GripperShape& g, const Pose& part_from_tcp,
+                                   bool finely) {
   std::vector<JawTouch> touches;
   for (int k = 0; k < g.jaws; ++k) {
-    const auto touch = touch_of(tree, g, part_from_tcp, k);
+    const auto touch = touch_of(tree, g, part_from_tcp, k, finely);
     if (!touch) return {};
     touches.push_back(*touch);
   }
   Contacts c;
   c.part_from_tcp = part_from_tcp;
-  double sum = 0, least = 1e300, most = -1e300, rays = 0;
+  c.area_mm2 = 1e300;
+  double sum = 0, least = 1e300, most = -1e300;
   for (const JawTouch& t : touches) {
     sum += t.distance;
     least = std::min(least, t.distance);
     most = std::max(most, t.distance);
     c.center += t.center / g.jaws;
-    rays += t.rays;
+    c.area_mm2 = std::min(c.area_mm2, t.area_mm2);
   }
   if (sum <= 0) return {};
   // Two jaws are put into the middle of what they touch; three must stand there already.
@@ -88,7 +101,6 @@ std::optional<Contacts> close_jaws(const MeshTree& tree, const GripperShape& g, 
   else if (most - least > kPushed_mm)
     return {};
   c.opening_mm = 2 * sum / g.jaws;
-  c.share = rays / (g.jaws * kAcross * kAlong);
   for (int k = 0; k < g.jaws; ++k) {
     // Two contacts are held along their line, three towards the middle of them.
     Vec3 line = g.jaws == 2 ? Vec3(touches[k].center - touches[1 - k].center) : Vec3(touches[k].center - c.center);

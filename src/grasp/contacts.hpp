@@ -11,14 +11,17 @@ namespace tribin::grasp {
 struct Contacts {
   Pose part_from_tcp = Pose::Identity();  ///< moved so that all jaws touch at the same opening
   double opening_mm = 0;
-  double share = 0;            ///< of the pads (cups: of the disc) that touches
+  double share = 0;            ///< of a cup's disc that touches
+  double area_mm2 = 0;         ///< of the smallest of the jaws' contacts
   double friction_angle = 0;   ///< [rad] worst between the line of the contacts and their normals
   Vec3 center = Vec3::Zero();  ///< of the contacts, part frame
 };
 
 /// Closes jaws onto a part (inside: spreads them). \return none where a jaw meets nothing within its stroke, or three
 /// jaws would have to move the part by more than 2 mm
-std::optional<Contacts> close_jaws(const MeshTree& tree, const GripperShape& gripper, const Pose& part_from_tcp);
+/// \param finely  false: by a few rays, for a first look
+std::optional<Contacts> close_jaws(const MeshTree& tree, const GripperShape& gripper, const Pose& part_from_tcp,
+                                   bool finely = true);
 
 /// Sets a cup or magnet on a part. \return none where nothing lies under its middle
 std::optional<Contacts> set_cup(const MeshTree& tree, const GripperShape& gripper, const Pose& part_from_tcp);

@@ -11,13 +11,12 @@ namespace {
 
 // Room a side with which the open jaws must pass the part itself; a scene may open them wider, and looks again.
 constexpr double kOpen_mm = 1, kGap_mm = 0.3;
-// Share of the pads that must touch: one ray of each jaw and a bit, so that it is a face or an edge and no corner.
-constexpr double kLeastPads = 0.05;
-// With that much of the pads on it a part is held as well as can be: rounds touch along a line only.
-constexpr double kGoodPads = 0.3;
+// Contact of a jaw: two of the rays that feel it at least, so that it is no lone corner; as good as can be where it is
+// half as large as a square of the jaw's width, since rounds touch along a line only.
+constexpr double kLeastContact_mm2 = 12, kGoodContact = 0.5;
 constexpr double kLeastMagnet = 0.7;
 // A spare candidate nearer to another than that share of the part, in the same direction, is dropped.
-constexpr double kNearShare = 0.06;
+constexpr double kNearShare = 0.1;
 
 Vec3 mass_center(const Part& part, const MeshTree& tree) {
   Vec3 moment = Vec3::Zero();
@@ -41,6 +40,12 @@ Vec3 mass_center(const Part& part, const MeshTree& tree) {
 std::optional<Candidate> tried(const GraspPart& known, int gripper, const Seed& seed) {
   const GripperShape& g = known.grippers[gripper];
   const MeshTree& tree = *known.tree;
+  // A few rays tell most of those that hold nothing; what they miss between them makes angles and widths uncertain.
+  constexpr double kRough = 2;
+  if (g.jaws > 0 && !seed.taught) {
+    const auto rough = close_jaws(tree, g, seed.part_from_tcp, false);
+    if (!rough || rough->friction_angle > kRough * std::atan(g.gripper.friction)) return {};
+  }
   const auto contacts = g.jaws > 0 ? close_jaws(tree, g, seed.part_from_tcp) : set_cup(tree, g, seed.part_from_tcp);
   if (!contacts) return {};
   Candidate c;
@@ -54,13 +59,14 @@ std::optional<Candidate> tried(const GraspPart& known, int gripper, const Seed& 
   const Vec3 line = c.part_from_tcp.linear().col(g.jaws == 2 ? 0 : 2);
   c.offset_mm = (arm - arm.dot(line) * line).norm();
   if (g.jaws > 0) {
-    c.contact = std::min(1.0, contacts->share / kGoodPads);
+    c.contact = std::min(1.0, contacts->area_mm2 / (kGoodContact * g.pad.width_mm * g.pad.width_mm));
     if (c.opening_mm < g.stroke_min() || c.opening_mm > g.stroke_max()) return {};
   } else {
     c.contact = contacts->share;
   }
   if (seed.taught) return c;  // who taught it knows
-  if (g.jaws > 0 && (contacts->share < kLeastPads || c.friction_angle > std::atan(g.gripper.friction))) return {};
+  if (g.jaws > 0 && (contacts->area_mm2 < kLeastContact_mm2 || c.friction_angle > std::atan(g.gripper.friction)))
+    return {};
   if (g.jaws == 0 && contacts->share < (g.gripper.kind == GripperKind::suction ? 1 : kLeastMagnet)) return {};
   const double room =
       g.jaws == 0 ? 0
@@ -71,13 +77,13 @@ std::optional<Candidate> tried(const GraspPart& known, int gripper, const Seed& 
   return c;
 }
 
-/// Whether no other candidate is as good as the same.
-bool is_new(const Candidate& c, const std::vector<Candidate>& known, std::size_t from, double near_mm) {
-  constexpr double kTraceNear = 1 + 2 * 0.95;  // of R' R: 18 deg
+/// Whether no candidate stands near a place.
+bool is_new(const Pose& place, const std::vector<Candidate>& known, std::size_t from, double near_mm) {
+  constexpr double kTraceNear = 1 + 2 * 0.93;  // of R' R: 21 deg
   for (std::size_t i = from; i < known.size(); ++i) {
-    const Pose &a = known[i].part_from_tcp, &b = c.part_from_tcp;
-    if ((a.translation() - b.translation()).squaredNorm() < near_mm * near_mm &&
-        a.linear().cwiseProduct(b.linear()).sum() > kTraceNear)
+    const Pose& other = known[i].part_from_tcp;
+    if ((other.translation() - place.translation()).squaredNorm() < near_mm * near_mm &&
+        other.linear().cwiseProduct(place.linear()).sum() > kTraceNear)
       return false;
   }
   return true;
@@ -88,15 +94,20 @@ void add_candidates(GraspPart& known, int gripper) {
   const std::vector<Seed> seeds = known.cell.pick_points.empty()
                                       ? seeds_of(*known.part, *known.tree, g, known.mass_center_mm)
                                       : taught_seeds(*known.part, known.cell, g.gripper.name);
-  std::vector<std::optional<Candidate>> found(seeds.size());
-  parallel_ranges(static_cast<int>(seeds.size()), 16, [&](int begin, int end) {
-    for (int i = begin; i < end; ++i) found[i] = tried(known, gripper, seeds[i]);
-  });
   const std::size_t before = known.candidates.size();
   const double near_mm = kNearShare * known.part->diameter_mm;
-  for (std::size_t i = 0; i < found.size(); ++i)
-    if (found[i] && (!seeds[i].spare || is_new(*found[i], known.candidates, before, near_mm)))
-      known.candidates.push_back(*found[i]);
+  // Spare seeds are tried only where none of the others holds nearby.
+  for (const bool spare : {false, true}) {
+    std::vector<std::optional<Candidate>> found(seeds.size());
+    parallel_ranges(static_cast<int>(seeds.size()), 16, [&](int begin, int end) {
+      for (int i = begin; i < end; ++i)
+        if (seeds[i].spare == spare && (!spare || is_new(seeds[i].part_from_tcp, known.candidates, before, near_mm)))
+          found[i] = tried(known, gripper, seeds[i]);
+    });
+    for (const auto& candidate : found)
+      if (candidate && (!spare || is_new(candidate->part_from_tcp, known.candidates, before, near_mm)))
+        known.candidates.push_back(*candidate);
+  }
   if (known.candidates.size() == before)
     known.warnings.push_back("part " + known.part->name + ": gripper " + g.gripper.name + " finds no hold (of " +
                              std::to_string(seeds.size()) + " places tried)");

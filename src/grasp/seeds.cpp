@@ -203,7 +203,7 @@ class Seeder {
 
   /// What no primitive tells: points all over the surface, and what lies opposite of them.
   void through_points() {
-    constexpr std::size_t kPoints = 160;
+    constexpr std::size_t kPoints = 120;
     const std::size_t count = part_.sample_points.size(), step = std::max<std::size_t>(1, count / kPoints);
     for (std::size_t i = step / 2; i < count; i += step) {
       const Vec3 in = -part_.sample_normals[i].cast<double>().normalized();
@@ -214,7 +214,7 @@ class Seeder {
       if (tree_.normal(hit->triangle).dot(in) < std::cos(std::atan(gripper_.gripper.friction))) continue;
       Vec3 u, v;
       orthonormal_basis(in, u, v);
-      for (int k = 0; k < kTurns; ++k) {
+      for (int k = 0; k < kTurns; k += 2) {
         const Vec3 approach = std::cos(k * kTurn) * u + std::sin(k * kTurn) * v;
         for (const double d : depths(pad_, hit->t)) {
           add(at + 0.5 * hit->t * in, in, approach, d, "points");

@@ -19,7 +19,7 @@ struct Candidate {
   int gripper = 0;     ///< index into GraspPart::grippers
   Pose part_from_tcp = Pose::Identity();
   double opening_mm = 0;      ///< of the jaws where they touch; 0 for cups and magnets
-  double contact = 1;         ///< share of the pads that touches, (0, 1]
+  double contact = 1;         ///< how well the jaws (cups: their disc) touch, (0, 1]
   double friction_angle = 0;  ///< [rad] worst between the line of the contacts and their normals
   double offset_mm = 0;       ///< of the mass centre from the line (cups: axis) that holds
   double priority = 1;        ///< taught points

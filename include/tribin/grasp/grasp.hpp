@@ -94,17 +94,17 @@ enum class Why {
   pose_sigma,      ///< 3 sigma of the place where the jaws close, against their room a side [mm]
   workspace,       ///< outside of it [mm]
   reach,           ///< no joint angles inside limits and margins, at one of the steps
-  form,            ///< the arm cannot follow the path in one configuration [rad between neighbours]
-  bin,             ///< open gripper against the walls and floor [mm of gap]
-  scan,            ///< against what was seen, and what lies behind it [mm]
-  part,            ///< against another found part [mm]
-  obstacle,        ///< against something that stands in the cell [mm]
-  held_bin,        ///< the part in hand against the walls on its way out [mm]
-  held_part,       ///< it would take another part along [mm]
-  arm_bin,         ///< links against the walls [mm]
-  arm_scan,        ///< links against what was seen [mm]
-  arm_obstacle,    ///< links against what stands in the cell [mm]
-  place,           ///< no place can be reached with it
+  form,       ///< the arm cannot follow the path in one configuration [rad between neighbours; 0: its form bits change]
+  bin,        ///< open gripper against the walls and floor [mm of gap]
+  scan,       ///< against what was seen, and what lies behind it [mm]
+  part,       ///< against another found part [mm]
+  obstacle,   ///< against something that stands in the cell [mm]
+  held_bin,   ///< the part in hand against the walls on its way out [mm]
+  held_part,  ///< it would take another part along [mm]
+  arm_bin,    ///< links against the walls [mm]
+  arm_scan,   ///< links against what was seen [mm]
+  arm_obstacle,  ///< links against what stands in the cell [mm]
+  place,         ///< no place can be reached with it
 };
 inline constexpr int kWhys = 20;
 /// The enumerator's own name: stable, programs compare it.
