@@ -112,6 +112,24 @@ std::optional<Contacts> close_jaws(const MeshTree& tree, const GripperShape& g, 
   return c;
 }
 
+std::optional<double> exact_opening(const MeshTree& tree, const GripperShape& g, const Pose& part_from_tcp,
+                                    double opening_mm) {
+  constexpr double kStep_mm = 0.1, kMost_mm = 2;
+  const auto touches = [&](double opening) {
+    return std::any_of(g.pieces.begin(), g.pieces.end(), [&](const GripperPiece& piece) {
+      if (!piece.jaw) return false;
+      Convex body = piece.body;
+      body.frame_from_body.translation() += opening * piece.travel;
+      return tree.gap_mm(moved(part_from_tcp, body), 1e-6) == 0;
+    });
+  };
+  for (double more = 0; more <= kMost_mm; more += kStep_mm) {
+    const double opening = g.inside ? opening_mm - more : opening_mm + more;
+    if (!touches(opening)) return opening;
+  }
+  return {};
+}
+
 std::optional<Contacts> set_cup(const MeshTree& tree, const GripperShape& g, const Pose& part_from_tcp) {
   const Vec3 x = part_from_tcp.linear().col(0), y = part_from_tcp.linear().col(1), in = part_from_tcp.linear().col(2);
   const Vec3 at = part_from_tcp.translation();

@@ -23,6 +23,11 @@ struct Contacts {
 std::optional<Contacts> close_jaws(const MeshTree& tree, const GripperShape& gripper, const Pose& part_from_tcp,
                                    bool finely = true);
 
+/// The opening at which jaws just touch, from one at which rays said they do: between rays the part may rise.
+/// \return none where it rises by more than 2 mm: the contacts are others
+std::optional<double> exact_opening(const MeshTree& tree, const GripperShape& gripper, const Pose& part_from_tcp,
+                                    double opening_mm);
+
 /// Sets a cup or magnet on a part. \return none where nothing lies under its middle
 std::optional<Contacts> set_cup(const MeshTree& tree, const GripperShape& gripper, const Pose& part_from_tcp);
 

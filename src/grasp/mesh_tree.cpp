@@ -54,6 +54,10 @@ std::uint32_t MeshTree::build(std::uint32_t begin, std::uint32_t end, const std:
     low = low.cwiseMin(centers[order_[i]]);
     high = high.cwiseMax(centers[order_[i]]);
   }
+  // Rays along an edge run in the face of a box: rounding must not put them outside.
+  constexpr double kRounding_mm = 1e-6;
+  node.low.array() -= kRounding_mm;
+  node.high.array() += kRounding_mm;
   nodes_.push_back(node);
   if (end - begin <= kLeaf) return id;
   int axis = 0;

@@ -59,6 +59,11 @@ std::optional<Candidate> tried(const GraspPart& known, int gripper, const Seed& 
   const Vec3 line = c.part_from_tcp.linear().col(g.jaws == 2 ? 0 : 2);
   c.offset_mm = (arm - arm.dot(line) * line).norm();
   if (g.jaws > 0) {
+    const auto exact = exact_opening(tree, g, c.part_from_tcp, c.opening_mm);
+    if (exact)
+      c.opening_mm = *exact;
+    else if (!seed.taught)
+      return {};
     c.contact = std::min(1.0, contacts->area_mm2 / (kGoodContact * g.pad.width_mm * g.pad.width_mm));
     if (c.opening_mm < g.stroke_min() || c.opening_mm > g.stroke_max()) return {};
   } else {
