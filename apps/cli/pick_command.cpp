@@ -28,7 +28,8 @@ struct Options {
   SourceArguments from;
   std::string cell, calibration, scan_unit = "auto", journal, answer, json = "-", report;
   int simulate = 0, most_parts = 0;
-  bool arm = false, dry_run = false, new_rack = false, any_age = false, no_cache = false, confirm_tools = false;
+  bool arm = false, dry_run = false, new_rack = false, recover = false, any_age = false, no_cache = false,
+       confirm_tools = false;
 };
 
 /// A scan file as a camera: read anew at each shot, for trials.
@@ -256,7 +257,7 @@ int work(Cell& cell, picking::Vision& vision, const Options& options) {
   std::optional<picking::RunPage> page;
   if (!options.report.empty()) page.emplace(options.report);
   picking::RunOptions run;
-  run.arm = true;
+  run.recover_only = options.recover;
   run.most_parts = options.most_parts;
   if (!options.answer.empty())
     run.answer = options.answer == "full" ? picking::Answer::slot_full : picking::Answer::slot_empty;
@@ -277,7 +278,7 @@ int work(Cell& cell, picking::Vision& vision, const Options& options) {
   log(LogLevel::info, end.status + ": " + end.message);
   if (end.status == "in_doubt") throw Error(ErrorCode::device, end.message);
   if (options.simulate > 0 && options.journal.empty()) std::filesystem::remove(journal_of(options));
-  return end.placed > 0 ? 0 : 1;
+  return end.placed > 0 || end.status == "recovered" ? 0 : 1;
 }
 
 int run(const Options& options, const Context&) {
@@ -312,6 +313,7 @@ void add_pick(CLI::App& app, Context& context) {
       ->type_name("N");
   command->add_option("--journal", options->journal, "What was done; left out: beside the cell's file")
       ->type_name("FILE");
+  command->add_flag("--recover", options->recover, "Settle what a crash left open, and stop; wants --arm");
   command->add_flag("--new-rack", options->new_rack, "An empty rack stands there");
   command
       ->add_option(

@@ -77,6 +77,7 @@ Phase Run::recover() {
       return in_doubt(what_was_ordered(open) + " (cycle " + std::to_string(open.cycle) +
                       ") was ordered, and the controller does not tell how it ended");
   }
+  if (options_.recover_only) return finish("recovered", "nothing is open");
   if (now().in_hand) return Phase::place;
   return now().at_station ? Phase::regrasp : Phase::scan;
 }

@@ -111,7 +111,6 @@ int main(int argc, char** argv) try {
     int without_help = 0;
     std::map<std::string, bool> helped;
     picking::RunOptions run;
-    run.arm = true;
     run.told = [&](const picking::CycleReport& report) {
       totals.missed += report.state == "missed";
       totals.lost += report.state == "lost";

@@ -60,8 +60,8 @@ enum class Answer { slot_full, slot_empty };
 struct RunOptions {
   robot::HandshakeOptions handshake;
   std::optional<Answer> answer;
-  int most_parts = 0;  ///< > 0: stop then
-  bool arm = false;    ///< --arm was given
+  int most_parts = 0;         ///< > 0: stop then
+  bool recover_only = false;  ///< settle what a crash left open, and stop
   std::function<void(const CycleReport&)> told;
   std::function<void(Phase)> entered;  ///< each phase, before it begins
 };
