@@ -7,6 +7,7 @@
 #include "commands.hpp"
 #include "output.hpp"
 #include "progress.hpp"
+#include "tribin/config/work_cell.hpp"
 #include "tribin/core/content_hash.hpp"
 #include "tribin/core/error.hpp"
 #include "tribin/core/log.hpp"
@@ -20,7 +21,7 @@ namespace {
 namespace fs = std::filesystem;
 
 struct Options {
-  std::string dataset, split = "test", targets, models = "models", shard, out, method = "surfel";
+  std::string dataset, split = "test", targets, models = "models", shard, out, bin, method = "surfel";
   int time_limit_ms = 0;
   bool no_times = false, no_cache = false;
 };
@@ -83,6 +84,7 @@ std::string recipe_of(const Options& options, const std::vector<eval::BopObject>
       {"split", options.split},
       {"method", options.method},
       {"time_limit_ms", options.time_limit_ms},
+      {"bin", options.bin.empty() ? "" : hex_of(content_hash(bytes_of(options.bin)))},
       {"times", !options.no_times},
       {"targets", options.targets.empty() ? "" : hex_of(content_hash(bytes_of(options.targets)))}};
   for (const eval::BopObject& object : objects)
@@ -136,6 +138,7 @@ std::string record_of(const eval::BopTask& task, const std::vector<eval::BopObje
   Found found;
   try {
     scan = read_scan(task.depth, {.camera_file = task.camera, .image_id = task.image});
+    if (!options.bin.empty()) finder.bin = known_bin(read_bin(options.bin), scan);
     found = find_parts(scan, offered.of(task), finder);
   } catch (const Error& e) {
     if (e.code() != ErrorCode::too_little_data && e.code() != ErrorCode::out_of_range) throw;
@@ -203,6 +206,9 @@ void add_bop(CLI::App& app, Context& context) {
   command->add_option("--method", options->method, "surfel or paper")
       ->check(CLI::IsMember({"surfel", "paper"}))
       ->type_name("M");
+  command->add_option("--bin", options->bin, "As of locate, for each image")
+      ->check(CLI::ExistingFile)
+      ->type_name("BIN.toml");
   command->add_option("--time-limit-ms", options->time_limit_ms, "As of locate, for each image")
       ->check(CLI::NonNegativeNumber)
       ->type_name("N");

@@ -5,6 +5,7 @@
 
 #include "commands.hpp"
 #include "output.hpp"
+#include "tribin/config/work_cell.hpp"
 #include "tribin/core/error.hpp"
 #include "tribin/core/log.hpp"
 #include "tribin/finder/finder.hpp"
@@ -17,7 +18,7 @@ namespace tribin::cli {
 namespace {
 
 struct Options {
-  std::string scan, camera, json, report, figures, truth, unit = "mm", scan_unit = "auto", method = "surfel";
+  std::string scan, camera, bin, json, report, figures, truth, unit = "mm", scan_unit = "auto", method = "surfel";
   std::vector<std::string> parts;
   double tolerance_mm = 0, tolerance_deg = 0;
   int time_limit_ms = 0;
@@ -80,6 +81,21 @@ void print_table(const Scan& scan, std::span<const Part> parts, const Found& fou
                 truth->truths.size());
 }
 
+void print_bin(const Scan& scan, const Found& found) {
+  if (found.bin && found.bin->found) {
+    const Vec3 t = scan.input_from_camera * Vec3(found.bin->camera_from_bin.translation());
+    std::printf("Bin at %.2f, %.2f, %.2f mm, %.0f %% full", t.x(), t.y(), t.z(), 100 * found.bin->fill);
+    if (found.bin->drift_sigma)
+      std::printf(", %.2f mm from its place (%.1f sigmas)", found.bin->drift_mm, *found.bin->drift_sigma);
+    std::printf(".\n");
+  }
+  for (const UnexplainedRegion& region : found.instances.unexplained) {
+    const Vec3 c = scan.input_from_camera * region.center_mm;
+    std::printf("Unexplained: %.0f mm3 at %.1f, %.1f, %.1f mm (%d pixels).\n", region.volume_mm3, c.x(), c.y(), c.z(),
+                region.pixels);
+  }
+}
+
 void print_times(const StageTimes& times) {
   for (const auto& [stage, ms] : times.stages_ms) std::printf("%s %.1f ms, ", stage.c_str(), ms);
   std::printf("total without read %.1f ms\n", times.total());
@@ -108,6 +124,7 @@ int run(Options options, const Context& context) {
   options.finder.tolerance_mm = options.tolerance_mm;
   options.finder.tolerance_rad = options.tolerance_deg * kDegree;
   options.finder.time_limit_ms = options.time_limit_ms;
+  if (!options.bin.empty()) options.finder.bin = known_bin(read_bin(options.bin), scan);
   Found found = find_parts(scan, parts, options.finder);
   found.times.stages_ms.insert(found.times.stages_ms.begin(), reading.stages_ms.begin(), reading.stages_ms.end());
   for (const Warning& warning : found.warnings) log(LogLevel::warning, warning.text);
@@ -128,6 +145,7 @@ int run(Options options, const Context& context) {
   }
   if (options.json != "-") {
     print_table(scan, parts, found, truth);
+    print_bin(scan, found);
     if (!options.no_times) print_times(found.times);
   }
   return exit_code(found);
@@ -147,6 +165,10 @@ void add_locate(CLI::App& app, Context& context) {
       ->allow_extra_args(false);
   command->add_option("--camera", options->camera, "Camera file of a depth image (camera.json, BOP scene_camera.json)")
       ->type_name("FILE");
+  command
+      ->add_option("--bin", options->bin,
+                   "The bin that the parts lie in: a file with [bin], or a work cell. Without its place it is sought")
+      ->type_name("BIN.toml");
   command->add_option("--tolerance-mm", options->tolerance_mm, "Give the probability that the place is within this")
       ->check(CLI::NonNegativeNumber)
       ->type_name("X");
@@ -172,6 +194,7 @@ void add_locate(CLI::App& app, Context& context) {
   add_no_cache(command, options->no_cache);
   only_experts(command->add_option("--figures", options->figures), context);
   only_experts(command->add_option("--cell-px", options->finder.surfel.cell_px), context);
+  only_experts(command->add_option("--work-limit", options->finder.work_limit), context);
   only_experts(command->add_option("--max-radius-mm", options->finder.surfel.max_radius_mm), context);
   only_experts(command->add_option("--min-area-mm2", options->finder.segmentation.min_area_mm2), context);
   command->callback([options, &context] { context.run = [options, &context] { return run(*options, context); }; });

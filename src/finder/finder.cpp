@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 
+#include "tribin/config/work_cell.hpp"
 #include "tribin/core/error.hpp"
 #include "tribin/paper_method/recognize.hpp"
 #include "tribin/recognition/recognize.hpp"
@@ -50,7 +52,39 @@ void check_size(const Scan& scan, const Part& part, std::vector<Warning>& warnin
                   ".");
 }
 
+std::string with(const char* format, double a, double b, double c) {
+  char text[240];
+  std::snprintf(text, sizeof text, format, a, b, c);
+  return text;
+}
+
+void warn_of_bin(const BinSighting& bin, std::vector<Warning>& warnings) {
+  if (!bin.found) {
+    warnings.push_back(
+        {"bin_not_found", "the bin is not found, and nothing of it is taken out of the scan: " + bin.reason});
+  } else if (bin.drift_sigma && *bin.drift_sigma > kDriftLimit) {
+    warnings.push_back({"calibration_drift",
+                        with("the bin is seen %.2f mm and %.2f deg from where it is said to stand, %.1f sigmas: it was "
+                             "moved, or the hand-eye calibration has drifted",
+                             bin.drift_mm, bin.drift_rad / kDegree, *bin.drift_sigma)});
+  }
+}
+
 }  // namespace
+
+KnownBin known_bin(const WorkCell& cell, const Scan& scan) {
+  TRIBIN_ASSERT(cell.bin.has_value());
+  KnownBin out;
+  out.shape = {cell.bin->inner_size_mm, cell.bin->wall_mm};
+  out.sigma_mm = cell.hand_eye.sigma_mm;
+  out.sigma_rad = cell.hand_eye.sigma_rad;
+  const Pose base_from_input = base_from_camera(cell, scan.taken, scan.source);
+  const Pose camera_from_bin = (base_from_input * scan.input_from_camera).inverse() * cell.bin->base_from_bin;
+  // Both left out: no camera stands in the middle of a bin's floor.
+  if (!cell.bin->base_from_bin.isApprox(Pose::Identity()) || !base_from_input.isApprox(Pose::Identity()))
+    out.camera_from_bin = camera_from_bin;
+  return out;
+}
 
 Found find_parts(const Scan& scan, std::span<const Part> parts, const FinderOptions& options) {
   Found found;
@@ -80,9 +114,16 @@ Found find_parts(const Scan& scan, std::span<const Part> parts, const FinderOpti
     const StageTimer timer(found.times, "modelling");
     found.observation = build_model(found.primitives, found.surfels);
   }
+  if (options.bin) {
+    const StageTimer timer(found.times, "bin");
+    found.bin = find_bin(*options.bin, found.surfels, found.observation);
+    warn_of_bin(*found.bin, found.warnings);
+  }
   {
     const StageTimer timer(found.times, "recognition_and_pose");
     RecognitionOptions recognition;
+    if (found.bin && found.bin->found) recognition.bin = &*found.bin;
+    recognition.work_limit = options.work_limit;
     recognition.tolerance_mm = options.tolerance_mm;
     recognition.tolerance_rad = options.tolerance_rad;
     // What the stages before took counts too.
@@ -97,7 +138,8 @@ Found find_parts(const Scan& scan, std::span<const Part> parts, const FinderOpti
   else if (!found.instances.items.empty())
     found.status = "ok";
   else
-    found.status = found.instances.unexplained || !found.instances.uncertain.empty() ? "not_empty_no_object" : "empty";
+    found.status =
+        found.instances.unexplained.empty() && found.instances.uncertain.empty() ? "empty" : "not_empty_no_object";
   return found;
 }
 

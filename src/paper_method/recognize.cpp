@@ -6,6 +6,7 @@
 #include "hypotheses.hpp"
 #include "tribin/paper_method/pose.hpp"
 #include "tribin/paper_method/tests.hpp"
+#include "tribin/recognition/unexplained.hpp"
 
 namespace tribin::paper {
 namespace {
@@ -169,7 +170,7 @@ Instances recognize(const Primitives& primitives, const PrimitiveModel& observat
     if (best != all.end())
       out.items.push_back(instance_of(*best, object, surfels));
     else
-      out.unexplained = true;
+      out.unexplained.push_back(region_of(surfels, object.surfels, ground_around(surfels, primitives, object.surfels)));
   }
   std::stable_sort(out.items.begin(), out.items.end(),
                    [](const Instance& a, const Instance& b) { return a.score > b.score; });

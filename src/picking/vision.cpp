@@ -26,7 +26,9 @@ class CameraVision : public Vision {
     const std::optional<std::int64_t> now = from_.any_age ? std::nullopt : std::optional(now_ms());
     const Pose base_from_input = base_from_camera(*from_.cell, scan_.taken, from_.camera->name(), now);
     base_from_camera_ = base_from_input * scan_.input_from_camera;
-    found_ = find_parts(scan_, *from_.parts);
+    FinderOptions options;
+    if (from_.cell->bin) options.bin = known_bin(*from_.cell, scan_);
+    found_ = find_parts(scan_, *from_.parts, options);
     make_scene();
     Sight sight;
     sight.status = found_->status;

@@ -1,16 +1,20 @@
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "cell_mask.hpp"
 #include "tribin/model/primitive_model.hpp"
 #include "tribin/part/part.hpp"
 #include "tribin/pose/scene_depth.hpp"
+#include "tribin/recognition/instance.hpp"
 
 // Hypotheses: poses of a part that some primitives of the scan suggest. They are many and cheap; the look-up in the
 // depth image decides which are worth more work. Every generator writes into one list, in an order that depends on the
 // input alone.
 namespace tribin {
+
+struct BinSighting;
 
 /// A scene primitive with what the generators need to know of it.
 struct SceneFeature {
@@ -64,6 +68,13 @@ void hypotheses_from_point_pairs(const SceneFeatures& scene, const Part& part, s
 /// The surfels of connected pieces of the scan that neither the background nor an accepted instance explains and that
 /// are large enough to be a piece of the part. Empty = nothing is left that could be one.
 std::vector<std::uint32_t> unexplained_surfels(const SceneFeatures& scene, const Part& part);
+
+/// What neither a part nor the ground explains. The ground is the bin and what lies around it; without one, what is too
+/// large for any of the parts. Pieces smaller than those that could be one of the parts are left out.
+/// \param explained  cells of the parts that are told.
+/// \return largest volume first.
+std::vector<UnexplainedRegion> unexplained_regions(const SceneFeatures& scene, std::span<const Part> parts,
+                                                   const CellMask& explained, const BinSighting* bin);
 
 /// Rotation that turns frame (x, y) of the part onto that of the camera: camera_from_part with R x_part = x_camera and
 /// the y of both in one half plane.

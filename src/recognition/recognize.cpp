@@ -1,15 +1,16 @@
 #include "tribin/recognition/recognize.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 
+#include "budget.hpp"
 #include "choice.hpp"
 #include "instance_report.hpp"
 #include "likelihood.hpp"
 #include "tribin/core/error.hpp"
 #include "tribin/core/parallel.hpp"
 #include "tribin/pose/systematic_error.hpp"
+#include "tribin/recognition/bin.hpp"
 #include "weak_directions.hpp"
 
 namespace tribin {
@@ -173,7 +174,7 @@ double own_share(const CellMask& mask, const Image<std::uint8_t>& background) {
 /// \param stands  what earlier rounds found; grows.
 std::vector<Polished> choose(const SceneFeatures& features, const SceneDepth& scene, std::span<const Part> parts,
                              std::vector<PoseCandidate> candidates, Standing& stands, Refused& refused,
-                             std::vector<Reason>& rejected) {
+                             WorkBudget& budget, std::vector<Reason>& rejected) {
   std::erase_if(candidates, [&](const PoseCandidate& c) { return refused.holds(parts, c); });
   std::stable_sort(candidates.begin(), candidates.end(), [](const PoseCandidate& a, const PoseCandidate& b) {
     return a.verification.gain > b.verification.gain;
@@ -196,6 +197,8 @@ std::vector<Polished> choose(const SceneFeatures& features, const SceneDepth& sc
                             place_of(part, candidates[i])});
       continue;
     }
+    if (!budget.take()) break;
+    const double begun_ms = budget.elapsed_ms();
     // The rivals for this place: the best two of each part that are not far behind, and as many more poses as the
     // polish can look at.
     constexpr int kLookedAt = 6;
@@ -263,8 +266,19 @@ std::vector<Polished> choose(const SceneFeatures& features, const SceneDepth& sc
     claimed.join(winner.mask);
     stands.candidates.push_back(winner.candidate);
     winners.push_back(std::move(winner));
+    budget.found_one(begun_ms);
   }
   return winners;
+}
+
+/// The bin itself, and all that lies around it.
+CellMask cells_of_bin(const BinSighting& bin, const Surfels& surfels) {
+  const Image<std::uint8_t> inside = cells_inside(bin, surfels);
+  CellMask out;
+  out.bits.assign(inside.size() / 64 + 1, 0);
+  for (std::size_t i = 0; i < inside.size(); ++i)
+    if (!inside.data[i]) out.bits[i / 64] |= std::uint64_t{1} << (i % 64), ++out.count;
+  return out;
 }
 
 /// Each part's self-similar poses are decided again, in the order in which the parts were found: the first ones were
@@ -287,11 +301,8 @@ Instances recognize(const Primitives& primitives, const PrimitiveModel& observat
   SceneDepth scene = make_scene_depth(*surfels.scan, surfels);
   SceneFeatures features = make_scene_features(primitives, observation, surfels);
 
-  const auto start = std::chrono::steady_clock::now();
-  const auto late = [&] {
-    return options.time_limit_ms > 0 &&
-           std::chrono::steady_clock::now() - start > std::chrono::milliseconds(options.time_limit_ms);
-  };
+  if (options.bin != nullptr) claim_cells(features, cells_of_bin(*options.bin, surfels));
+  WorkBudget budget(options.time_limit_ms, options.work_limit);
   Refused refused;
   Standing stands;
   std::vector<Polished> found;
@@ -299,15 +310,15 @@ Instances recognize(const Primitives& primitives, const PrimitiveModel& observat
   for (const Source source : {Source::primitives, Source::point_pairs}) {
     constexpr int kRounds = 8;  // each round takes at least one part of those that touch or hide each other
     for (int round = 0; round < kRounds; ++round) {
-      if ((out.time_limit = late())) break;
+      if (budget.exhausted()) break;
       std::vector<PoseCandidate> candidates;
-      for (std::size_t i = 0; i < parts.size(); ++i) {
+      for (std::size_t i = 0; i < parts.size() && budget.take(); ++i) {
         const std::vector<PoseCandidate> of_part =
             find_candidates(features, scene, parts[i], static_cast<int>(i), source, out.rejected);
         candidates.insert(candidates.end(), of_part.begin(), of_part.end());
       }
       std::vector<Polished> winners =
-          choose(features, scene, parts, std::move(candidates), stands, refused, out.rejected);
+          choose(features, scene, parts, std::move(candidates), stands, refused, budget, out.rejected);
       for (Polished& w : winners) {
         claim_cells(features, w.mask);
         found.push_back(std::move(w));
@@ -315,7 +326,10 @@ Instances recognize(const Primitives& primitives, const PrimitiveModel& observat
       if (winners.empty()) break;
     }
   }
+  out.time_limit = budget.exhausted();
+  out.work_done = budget.done();
   decide_together(scene, parts, found);
+  CellMask told;  // cells of the parts that are told of; what is kept back explains nothing
   for (const Polished& p : found) {
     Instance instance = make_instance(p, parts, scene, features, surfels.scan->noise, options);
     const auto kept_back = [&](const char* test, double value, double limit) {
@@ -326,11 +340,14 @@ Instances recognize(const Primitives& primitives, const PrimitiveModel& observat
       kept_back("probability", sure, kGivenOut);
     } else if (instance.score < kGivenOut) {
       kept_back("self_similar", instance.score, kGivenOut);
+      told.join(p.mask);
       out.uncertain.push_back(std::move(instance));
     } else if (instance.p_within_tolerance && *instance.p_within_tolerance < kGivenOut) {
       kept_back("tolerance", *instance.p_within_tolerance, kGivenOut);
+      told.join(p.mask);
       out.uncertain.push_back(std::move(instance));
     } else {
+      told.join(p.mask);
       out.items.push_back(std::move(instance));
     }
   }
@@ -341,8 +358,7 @@ Instances recognize(const Primitives& primitives, const PrimitiveModel& observat
     for (Instance& instance : *list) instance.id = ++id;
   }
   name_neighbours(parts, out);
-  out.unexplained =
-      std::any_of(parts.begin(), parts.end(), [&](const Part& p) { return !unexplained_surfels(features, p).empty(); });
+  out.unexplained = unexplained_regions(features, parts, told, options.bin);
   return out;
 }
 

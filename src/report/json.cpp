@@ -85,6 +85,26 @@ Json reason_json(const Reason& reason, const Pose& input_from_camera) {
   return out;
 }
 
+/// What stands in it when the bin is found, and why it is not.
+Json bin_json(const BinSighting& bin, const Pose& input_from_camera) {
+  if (!bin.found) return {{"found", false}, {"reason", bin.reason}};
+  Json out = {{"camera_from_bin", json::pose(input_from_camera * bin.camera_from_bin)},
+              {"found", true},
+              {"fill", json::rounded(bin.fill, 4)}};
+  if (bin.drift_sigma) {
+    out["drift_sigma"] = json::rounded(*bin.drift_sigma, 2);
+    out["drift_mm"] = json::rounded(bin.drift_mm, 3);
+    out["drift_deg"] = json::rounded(bin.drift_rad / kDegree, 4);
+  }
+  return out;
+}
+
+Json region_json(const UnexplainedRegion& region, const Pose& input_from_camera) {
+  return {{"center_mm", json::millimetres(Vec3(input_from_camera * region.center_mm))},
+          {"volume_mm3", json::rounded(region.volume_mm3, 1)},
+          {"pixels", region.pixels}};
+}
+
 }  // namespace
 
 std::string locate_json(const Scan& scan, const Found& found, const JsonOptions& options) {
@@ -101,6 +121,11 @@ std::string locate_json(const Scan& scan, const Found& found, const JsonOptions&
   for (const Reason& reason : found.instances.rejected)
     out["rejected"].push_back(reason_json(reason, scan.input_from_camera));
   out["primitives"] = json::counts(found.primitives.items);
+  if (found.bin) out["bin"] = bin_json(*found.bin, scan.input_from_camera);
+  out["unexplained"] = Json::array();
+  for (const UnexplainedRegion& region : found.instances.unexplained)
+    out["unexplained"].push_back(region_json(region, scan.input_from_camera));
+  out["work_done"] = found.instances.work_done;
   out["warnings"] = json::warnings(found.warnings, scan.warnings);
   if (options.times) out["stages_ms"] = json::stages(found.times);
   return json::text_of(out);

@@ -9,6 +9,7 @@
 #include "sim/solid.hpp"
 #include "tribin/cad/measure.hpp"
 #include "tribin/core/error.hpp"
+#include "tribin/recognition/bin.hpp"
 
 namespace tribin::sim {
 namespace {
@@ -68,28 +69,7 @@ void note_walls(const Mesh& mesh, const Pose& pose, double length, double width,
 }  // namespace
 
 Mesh bin_mesh(const Bin& bin) {
-  Mesh mesh;
-  mesh.name = "bin";
-  const float x = static_cast<float>(bin.length_mm / 2), y = static_cast<float>(bin.width_mm / 2),
-              w = static_cast<float>(bin.wall_mm), h = static_cast<float>(bin.height_mm);
-  // Four rings of four corners: inner floor, inner rim, outer rim, outer floor; each seen from above, against the
-  // clock.
-  const auto ring = [&](float a, float b, float z) {
-    mesh.vertices.insert(mesh.vertices.end(), {Vec3f(-a, -b, z), Vec3f(a, -b, z), Vec3f(a, b, z), Vec3f(-a, b, z)});
-  };
-  ring(x, y, 0), ring(x, y, h), ring(x + w, y + w, h), ring(x + w, y + w, -w);
-  const auto quad = [&](std::uint32_t a, std::uint32_t b, std::uint32_t c, std::uint32_t d) {
-    mesh.triangles.push_back({a, b, c});
-    mesh.triangles.push_back({a, c, d});
-  };
-  quad(0, 1, 2, 3);
-  for (std::uint32_t r = 0; r < 3; ++r)
-    for (std::uint32_t i = 0; i < 4; ++i) {
-      const std::uint32_t k = (i + 1) % 4;
-      quad(4 * r + i, 4 * r + 4 + i, 4 * r + 4 + k, 4 * r + k);
-    }
-  quad(12, 15, 14, 13);
-  return mesh;
+  return tribin::bin_mesh(BinShape{{bin.length_mm, bin.width_mm, bin.height_mm}, bin.wall_mm});
 }
 
 BinFill fill_bin(const std::vector<const Solid*>& parts, double length_mm, double width_mm, std::uint64_t seed) {

@@ -1,14 +1,18 @@
 #pragma once
 
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "tribin/core/stage_times.hpp"
 #include "tribin/part/part.hpp"
+#include "tribin/recognition/bin.hpp"
 #include "tribin/recognition/instance.hpp"
 
 namespace tribin {
+
+struct WorkCell;
 
 struct Warning {
   std::string code;
@@ -24,8 +28,14 @@ struct FinderOptions {
   SegmentationOptions segmentation;
   double tolerance_mm = 0;  ///< 0 = none asked for
   double tolerance_rad = 0;
-  int time_limit_ms = 0;  ///< 0 = none
+  int time_limit_ms = 0;        ///< 0 = none
+  int work_limit = 0;           ///< Instances::work_done of a run to be repeated; 0 = none
+  std::optional<KnownBin> bin;  ///< the bin that the parts lie in
 };
+
+/// The bin of a cell, as the scan's camera sees it; a file with [bin] alone that names no place leaves it to be sought.
+/// \throws Error as base_from_camera (tribin/config/work_cell.hpp).
+KnownBin known_bin(const WorkCell& cell, const Scan& scan);
 
 /// Everything that one look at a scan gave: the instances, and what led to them.
 struct Found {
@@ -33,6 +43,7 @@ struct Found {
   Surfels surfels;     ///< refers to the scan
   Primitives primitives;
   PrimitiveModel observation;
+  std::optional<BinSighting> bin;  ///< where one was given
   Instances instances;
   std::vector<Warning> warnings;
   StageTimes times;

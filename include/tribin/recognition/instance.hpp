@@ -64,14 +64,23 @@ struct Instance {
   std::vector<Evidence> evidence;
 };
 
+/// A connected piece of the scan that neither a part nor the background explains, and that is large enough to be a
+/// piece of a part.
+struct UnexplainedRegion {
+  Vec3 center_mm = Vec3::Zero();  ///< mean of its points, camera frame
+  double volume_mm3 = 0;          ///< between what is seen of it and the bin's floor, or the plane that it lies on
+  int pixels = 0;                 ///< measured ones
+};
+
 struct Instances {
   std::vector<Instance> items;
   /// Class and place are sure, but which of its self-similar poses it is in is less likely told than not, or the pose
   /// is not as exact as was asked for. Same fields; `alternatives` holds the other poses.
   std::vector<Instance> uncertain;
   std::vector<Reason> rejected;
-  bool time_limit = false;   ///< the time ran out before all that is left was looked at
-  bool unexplained = false;  ///< something of a part's size is left that neither a part nor a large surface explains
+  bool time_limit = false;                     ///< the time ran out before all that is left was looked at
+  std::vector<UnexplainedRegion> unexplained;  ///< largest volume first; empty = nothing of a part's size is left
+  int work_done = 0;                           ///< units of the search: a run with this work_limit ends as this one
 };
 
 }  // namespace tribin

@@ -8,10 +8,14 @@
 
 namespace tribin {
 
+struct BinSighting;
+
 struct RecognitionOptions {
   double tolerance_mm = 0;   ///< > 0: p_within_tolerance tells how likely the place is that good
   double tolerance_rad = 0;  ///< and the rotation
-  int time_limit_ms = 0;     ///< > 0: no new round of the search is begun after it; 0 = none
+  int time_limit_ms = 0;     ///< > 0: the search ends so early that what is found can be finished by then; 0 = none
+  int work_limit = 0;        ///< > 0: it ends after so many units of work (Instances::work_done); 0 = none
+  const BinSighting* bin = nullptr;  ///< found: parts are sought in it alone, and it holds none itself
 };
 
 /// Finds the parts in a scan: hypotheses from primitives, looked up in the depth image, verified by rendering, chosen
