@@ -40,6 +40,7 @@ void add_bop(CLI::App& app, Context& context);
 void add_merge(CLI::App& app, Context& context);
 void add_eval(CLI::App& app, Context& context);
 void add_bench(CLI::App& app, Context& context);
+void add_grasps(CLI::App& app, Context& context);
 void add_pick(CLI::App& app, Context& context);
 void add_robot_server(CLI::App& app, Context& context);
 void add_simulate_controller(CLI::App& app, Context& context);

@@ -63,6 +63,7 @@ int main(int argc, char** argv) {
   tribin::cli::add_scan(app, context);
   tribin::cli::add_simulate(app, context);
   tribin::cli::add_robot_server(app, context);
+  tribin::cli::add_grasps(app, context);
   tribin::cli::add_pick(app, context);
   tribin::cli::add_simulate_controller(app, context);
   tribin::cli::add_calibrate(app, context);

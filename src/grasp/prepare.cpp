@@ -48,6 +48,11 @@ std::optional<Candidate> tried(const GraspPart& known, int gripper, const Seed& 
   }
   const auto contacts = g.jaws > 0 ? close_jaws(tree, g, seed.part_from_tcp) : set_cup(tree, g, seed.part_from_tcp);
   if (!contacts) return {};
+  const bool suction = g.gripper.kind == GripperKind::suction;
+  const bool holds =
+      g.jaws > 0 ? contacts->area_mm2 >= kLeastContact_mm2 && contacts->friction_angle <= std::atan(g.gripper.friction)
+                 : contacts->share >= (suction ? 1 : kLeastMagnet);
+  if (!holds && !seed.taught) return {};  // who taught it knows
   Candidate c;
   c.family = seed.family;
   c.gripper = gripper;
@@ -55,6 +60,7 @@ std::optional<Candidate> tried(const GraspPart& known, int gripper, const Seed& 
   c.part_from_tcp = seed.taught ? seed.part_from_tcp : contacts->part_from_tcp;
   c.opening_mm = contacts->opening_mm;
   c.friction_angle = contacts->friction_angle;
+  c.contact = contacts->share;
   const Vec3 arm = known.mass_center_mm - contacts->center;
   const Vec3 line = c.part_from_tcp.linear().col(g.jaws == 2 ? 0 : 2);
   c.offset_mm = (arm - arm.dot(line) * line).norm();
@@ -66,13 +72,8 @@ std::optional<Candidate> tried(const GraspPart& known, int gripper, const Seed& 
       return {};
     c.contact = std::min(1.0, contacts->area_mm2 / (kGoodContact * g.pad.width_mm * g.pad.width_mm));
     if (c.opening_mm < g.stroke_min() || c.opening_mm > g.stroke_max()) return {};
-  } else {
-    c.contact = contacts->share;
   }
-  if (seed.taught) return c;  // who taught it knows
-  if (g.jaws > 0 && (contacts->area_mm2 < kLeastContact_mm2 || c.friction_angle > std::atan(g.gripper.friction)))
-    return {};
-  if (g.jaws == 0 && contacts->share < (g.gripper.kind == GripperKind::suction ? 1 : kLeastMagnet)) return {};
+  if (seed.taught) return c;
   const double room =
       g.jaws == 0 ? 0
                   : std::min(kOpen_mm, (g.inside ? c.opening_mm - g.stroke_min() : g.stroke_max() - c.opening_mm) / 2);

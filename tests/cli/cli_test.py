@@ -20,7 +20,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 DATA = pathlib.Path(os.environ.get("TRIBIN_DATA", ROOT / "../shared/data"))
 SCENES = DATA / "scenes_dev"
 COMMANDS = ["locate", "segment", "normals", "part", "convert", "patterns", "scan", "simulate", "simulate-controller",
-            "robot-server", "calibrate", "bop", "merge", "eval", "bench"]
+            "robot-server", "grasps", "calibrate", "bop", "merge", "eval", "bench"]
 TRIBIN, WORK = sys.argv[1], pathlib.Path(sys.argv[2])
 
 
@@ -294,6 +294,40 @@ scan_max_age_s = 100
         no_time = Served("robot-server", self.scene / "depth/000000.png", "--workcell", cell, "--port", 0)
         with no_time as served:  # motion goes by a scan whose age is known only
             self.assertIn("500,", served.talk("HELLO,1,kuka\r\nSCAN\r\nBYE\r\n", "202\r\n"))
+
+    def test_grasps_have_their_paths_terms_and_reasons(self):
+        cell = WORK / "grasps_cell.toml"
+        cell.write_text(f"""[camera]
+file = "{self.scene.resolve()}/scene_camera.json"
+[hand_eye]
+base_from_camera = {{translation_mm = [1000, 0, 900], rotation_deg = {{convention = "yaskawa", values = [180, 0, 0]}}}}
+[[gripper]]
+name = "jaw"
+kind = "parallel_outside"
+stroke_mm = [0, 150]
+finger_mm = [12, 20, 110]
+tip_mm = 5
+flange_from_tcp = {{translation_mm = [0, 0, 185]}}
+boxes = [{{center_mm = [0, 0, 35], size_mm = [90, 70, 70]}}]
+[[part]]
+name = "alternator_a"
+cad = "{SCENES.resolve()}/cad/alternator_a.stl"
+max_tilt_deg = 90
+[[robot]]
+model = "{ROOT.resolve()}/examples/robots/gp110.toml"
+""")
+        asked = ["grasps", self.scene / "depth/000000.png", "--workcell", cell, "--pushes", "--json", "-"]
+        one, two = (run(*asked, "--threads", n) for n in (1, 2))
+        self.assertEqual(one.returncode, 0, one.stderr)
+        self.assertEqual(one.stdout, two.stdout)
+        plan = validated(self, "grasps", one.stdout)
+        self.assertEqual(plan["status"], "ok")
+        scores = [grasp["score"] for grasp in plan["grasps"]]
+        self.assertEqual(scores, sorted(scores, reverse=True))
+        for grasp in plan["grasps"]:
+            self.assertEqual(len(grasp["path"][0]["joints_deg"]), 6)
+            self.assertEqual([p["step"] for p in grasp["path"]][-3:], ["pre_pick", "pick", "retreat"])
+        self.assertEqual(sum(r["count"] for r in plan["reasons"]), len(plan["refused"]))
 
     def test_a_kept_part_is_found_as_one_that_is_compiled_now(self):
         kept, compiled = run(*self.arguments, "--json", "-"), run(*self.arguments, "--json", "-", "--no-cache")
