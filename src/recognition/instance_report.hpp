@@ -12,8 +12,9 @@ std::vector<Vector6> free_directions_about_center(const Part& part, const Pose& 
 
 /// Fills covariance, free and weak directions from the information of the final refinement.
 /// \param systematic_pull  from pull_of_systematic_errors, at the refined pose.
-void describe_uncertainty(const Part& part, const Matrix6& systematic_pull, const Refinement& refinement,
-                          Instance& instance);
+/// \param patch_pull       from pull_of_patches, the same.
+void describe_uncertainty(const Part& part, const Matrix6& systematic_pull, const Matrix6& patch_pull,
+                          const Refinement& refinement, Instance& instance);
 
 /// Fills evidence: each primitive of the part that enough pixels show, measured without its nominal value.
 void describe_evidence(const Part& part, const SceneDepth& scene, const SceneFeatures& features, Instance& instance);

@@ -86,7 +86,9 @@ Instance make_instance(const Polished& p, std::span<const Part> parts, const Sce
   const Vec3 center(out.camera_from_part * part.box_center());
   const Matrix6 pull = pull_of_systematic_errors(part.render_mesh, scene, out.camera_from_part, noise, center, step,
                                                  options.cad_sigma_mm);
-  describe_uncertainty(part, pull, refined, out);
+  const Matrix6 patches =
+      pull_of_patches(part.render_mesh, scene, out.camera_from_part, center, step, options.cad_sigma_mm);
+  describe_uncertainty(part, pull, patches, refined, out);
   describe_evidence(part, scene, features, out);
 
   // Self-similar poses: those that keep 1 % are told.

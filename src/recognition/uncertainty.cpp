@@ -1,4 +1,5 @@
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
 
 #include "instance_report.hpp"
@@ -40,8 +41,8 @@ std::vector<Vector6> free_directions_about_center(const Part& part, const Pose& 
   return out;
 }
 
-void describe_uncertainty(const Part& part, const Matrix6& systematic_pull, const Refinement& refinement,
-                          Instance& instance) {
+void describe_uncertainty(const Part& part, const Matrix6& systematic_pull, const Matrix6& patch_pull,
+                          const Refinement& refinement, Instance& instance) {
   const double lever = part.gyration_mm;
   Vec6 scale;
   scale << 1, 1, 1, 1 / lever, 1 / lever, 1 / lever;
@@ -57,11 +58,13 @@ void describe_uncertainty(const Part& part, const Matrix6& systematic_pull, cons
   const Eigen::SelfAdjointEigenSolver<Mat6> eigen(h);
   const std::size_t free_count = part.symmetry.continuous.size();
   Mat6 held = Mat6::Zero();  // the inverse of the information, where there is any
+  Mat6 root = Mat6::Zero();  // its square root: columns
   for (int k = static_cast<int>(free_count); k < 6; ++k) {
     const double information = std::max(eigen.eigenvalues()(k) / inflation, 1 / (part.diameter_mm * part.diameter_mm));
     const Vec6 e = eigen.eigenvectors().col(k);
     const double sigma = 1 / std::sqrt(information);
     held += e * e.transpose() * (sigma * sigma);
+    root.col(k) = e * sigma;
     if (sigma > weak_limit_mm(part)) {
       WeakDirection weak;
       const Vec6 d = origin_from_center(part, instance.camera_from_part) * Vec6(scale.cwiseProduct(e));
@@ -75,8 +78,13 @@ void describe_uncertainty(const Part& part, const Matrix6& systematic_pull, cons
   }
   // Systematic: the pose follows the sensor's smooth errors as far as the pixels that hold it do.
   const Mat6 pull = Mat6(scale.asDiagonal()) * Mat6(systematic_pull) * Mat6(scale.asDiagonal());
-  Mat6 covariance = Mat6(scale.asDiagonal()) * (held + held * (keep * pull * keep) * held / (inflation * inflation)) *
-                    Mat6(scale.asDiagonal());
+  const Mat6 by_systematic = held * (keep * pull * keep) * held / (inflation * inflation);
+  // What patches have in common: in the coordinates in which the noise's covariance is 1, no direction gets less.
+  const Mat6 patches = Mat6(scale.asDiagonal()) * Mat6(patch_pull) * Mat6(scale.asDiagonal()) / (inflation * inflation);
+  const Eigen::SelfAdjointEigenSolver<Mat6> common(Mat6(root.transpose() * patches * root));
+  const Mat6 wide = root * common.eigenvectors() * common.eigenvalues().cwiseMax(1.0).asDiagonal() *
+                    common.eigenvectors().transpose() * root.transpose();
+  Mat6 covariance = Mat6(scale.asDiagonal()) * (wide + by_systematic) * Mat6(scale.asDiagonal());
   const Mat6 to_origin = origin_from_center(part, instance.camera_from_part);
   covariance = to_origin * covariance * to_origin.transpose();
   instance.free_directions.clear();

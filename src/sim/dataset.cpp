@@ -1,6 +1,7 @@
 #include "tribin/sim/dataset.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <exception>
 #include <fstream>
@@ -111,6 +112,15 @@ void open_dataset(const DatasetOptions& options, const fs::path& directory) {
   io::write_file(file, recipe.dump(1) + "\n");
 }
 
+/// What mirrored light and a tilted camera's floor make of it may lie beyond what the scene was laid out for.
+double largest_depth_mm(const SimulatedScan& simulated) {
+  float largest = 0;
+  for (const Image<float>* image : {&simulated.scan.z_mm, &simulated.true_z})
+    for (const float z : image->data)
+      if (z > largest && std::isfinite(z)) largest = z;
+  return largest;
+}
+
 void write_frames_of(const DrawnScene& drawn, std::uint64_t seed, const fs::path& folder) {
   const SceneFrames taken = frames_of(drawn, seed);
   write_frames(folder, {taken.frames});
@@ -164,7 +174,8 @@ void make_scene(const DatasetOptions& options, const SceneStock& stock, int scen
   write_bop_scene(unfinished,
                   {&simulated, drawn.camera_from_world, drawn.object_of_body, bounds_of(simulated, drawn),
                    options.scale_error, kShapeRms * drawn.sensor.systematic},
-                  static_cast<int>(options.parts.size()), depth_scale_for(drawn.largest_depth_mm));
+                  static_cast<int>(options.parts.size()),
+                  depth_scale_for(std::max(drawn.largest_depth_mm, largest_depth_mm(simulated))));
   if (options.frames) write_frames_of(drawn, seed, unfinished / "frames");
   io::write_file(unfinished / "scene_info.json", info.dump(1) + "\n");
   fs::rename(unfinished, directory / "test" / scene_name(scene));

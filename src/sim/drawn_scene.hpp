@@ -17,7 +17,7 @@ struct DrawnScene {
   std::vector<int> object_of_body;  ///< BOP obj_id (from 1); 0 = no part
   Pose camera_from_world = Pose::Identity();
   StructuredLight sensor;
-  double largest_depth_mm = 0;  ///< upper bound
+  double largest_depth_mm = 0;  ///< that it was laid out for
   nlohmann::ordered_json info;  ///< what is special to the kind
   std::vector<Mesh> own;        ///< meshes that the bodies point to: reserved before, never grown after
 };
