@@ -11,6 +11,7 @@ namespace {
 
 constexpr double kFirstTilt = 30 * kDegree;  // of an approach, before anything steeper is tried
 constexpr int kMostPerPart = 12;             // grasps of a part that are looked at for a way into a slot
+constexpr double kSamePart_mm = 20;          // a part that was missed lies that near to where it was
 constexpr double kTravelGap_mm = 20;         // over all that stands
 
 /// What software refuses of a motion, whatever the controller does.
@@ -113,12 +114,16 @@ std::optional<std::vector<Stop>> Chooser::way(const Start& start, const Pose& ba
   arm.singularity = 0;  // these are moves of the joints
   const Pose from = start.base_from_flange * arm.flange_from_tcp;
   const Vec3 bin = cell_.bin ? cell_.bin->base_from_bin.translation() : base_from_tcp.translation();
-  auto stops = stops_at(arm, way_between(from, base_from_tcp, travel_mm(), cell_.robots.front().way_points, bin),
-                        start.joints, false);
-  if (!stops || stops->empty() || !cell_.bin) return stops;
-  // Where the arm begins is not known at the very start: then its first stop is taken for it.
-  const Stop begin = start.joints ? Stop{from, *start.joints} : stops->front();
-  if (!arm_is_clear(arm, begin, *stops, bodies_of(*cell_.bin))) return {};
+  std::vector<Pose> poses = way_between(from, base_from_tcp, travel_mm(), cell_.robots.front().way_points, bin);
+  poses.push_back(base_from_tcp);  // the last piece leads there
+  auto stops = stops_at(arm, poses, start.joints, false);
+  if (!stops) return {};
+  if (cell_.bin) {
+    // Where the arm begins is not known at the very start: then its first stop is taken for it.
+    const Stop begin = start.joints ? Stop{from, *start.joints} : stops->front();
+    if (!arm_is_clear(arm, begin, *stops, bodies_of(*cell_.bin))) return {};
+  }
+  stops->pop_back();
   return stops;
 }
 
@@ -146,6 +151,7 @@ std::optional<Placing> Chooser::place(const Entry& held, const Filling& filling,
   const Pose flange_from_tcp = shape(held.gripper).gripper.flange_from_tcp;
   const auto has_ways = [&](const Placing& p) {
     if (!way(start, p.stops[0].base_from_tcp, held.gripper)) return false;
+    if (!cell_.bin) return true;
     const Start after{p.stops[2].base_from_tcp * flange_from_tcp.inverse(), p.stops[2].joints};
     return way(after, over_bin(), held.gripper).has_value();
   };
@@ -155,11 +161,16 @@ std::optional<Placing> Chooser::place(const Entry& held, const Filling& filling,
 }
 
 std::optional<Choice> Chooser::choose(const grasp::Plan& plan, const Filling& filling,
-                                      const std::optional<Start>& start, std::vector<std::string>& why) const {
+                                      const std::optional<Start>& start, std::span<const Where> wheres,
+                                      std::span<const Avoid> avoid, std::vector<std::string>& why) const {
   int no_way = 0, no_place = 0;
-  for (const Where where : {Where::slots, Where::station, Where::turned}) {
-    if (where != Where::slots && !has_station()) break;
+  for (const Where where : wheres) {
     for (const grasp::Grasp& grasp : plan.grasps) {
+      const Vec3 at = vision_.part(grasp.part).base_from_part.translation();
+      const auto is_there = [&](const Avoid& place) {
+        return place.gripper == grasp.gripper && (place.part_at - at).norm() < kSamePart_mm;
+      };
+      if (std::any_of(avoid.begin(), avoid.end(), is_there)) continue;
       if (start && !way(*start, grasp.path.front().base_from_tcp, grasp.gripper)) {
         ++no_way;
         continue;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -33,16 +34,23 @@ class Chooser {
     Pose base_from_flange = Pose::Identity();
     std::optional<robot::Joints> joints;
   };
-  /// The best grasp that the arm gets to, and whose part can go into a slot; failing that, to the station.
-  /// \param start  none: not known yet
-  /// \param why    gets what software refuses
-  std::optional<Choice> choose(const grasp::Plan& plan, const Filling& filling, const std::optional<Start>& start,
-                               std::vector<std::string>& why) const;
   enum class Where {
     slots,    ///< the open ones
     station,  ///< as in a slot
     turned,   ///< at the station in one of the other ways
   };
+  /// A part that a gripper is not to try now.
+  struct Avoid {
+    Vec3 part_at = Vec3::Zero();
+    std::string gripper;
+  };
+  /// The best grasp that the arm gets to, and whose part can go to a place.
+  /// \param start   none: not known yet
+  /// \param wheres  kinds of place, in that order
+  /// \param why     gets what software refuses
+  std::optional<Choice> choose(const grasp::Plan& plan, const Filling& filling, const std::optional<Start>& start,
+                               std::span<const Where> wheres, std::span<const Avoid> avoid,
+                               std::vector<std::string>& why) const;
   /// The first place of that kind for a part that is held like this. \param start  where its way begins
   std::optional<Placing> place(const Entry& held, const Filling& filling, const Start& start, Where where) const;
   /// The stops of a way; none where it is out of reach.

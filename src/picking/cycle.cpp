@@ -17,6 +17,9 @@ constexpr double kTurned = 45 * kDegree;  // a part that is put back as it stood
 constexpr int kPushClass = 255;           // B002 of a push, for jobs that close the jaws then
 constexpr double kClosed_mm = 0.1;        // an opening that is said, and closed
 
+constexpr double kSamePart_mm = 20;  // a part that was missed lies that near to where it was
+constexpr Chooser::Where kAll[] = {Chooser::Where::slots, Chooser::Where::station, Chooser::Where::turned};
+
 class Stopwatch {
  public:
   double ms() const {
@@ -95,9 +98,24 @@ RunEnd Run::go() {
   return end_;
 }
 
+std::vector<Chooser::Where> Run::wheres() const {
+  if (!chooser_.has_station() || now().at_station) return {Chooser::Where::slots};
+  return {std::begin(kAll), std::end(kAll)};
+}
+
+std::vector<Chooser::Avoid> Run::to_avoid() const {
+  std::vector<Chooser::Avoid> out;
+  for (std::size_t i = 0; i < failed_.size(); ++i)
+    for (std::size_t k = 0; k < i; ++k)
+      if (failed_[i].pick.gripper == failed_[k].pick.gripper &&
+          (failed_[i].part_at - failed_[k].part_at).norm() < kSamePart_mm)
+        out.push_back({failed_[i].part_at, failed_[i].pick.gripper});
+  return out;
+}
+
 Phase Run::finish(const std::string& status, const std::string& message) {
   end_.status = status;
-  end_.message = message;
+  end_.message = message + (station_trouble_.empty() ? "" : "; " + station_trouble_);
   return Phase::end;
 }
 
@@ -133,7 +151,7 @@ Phase Run::choose() {
   const Places places = chooser_.places(now().filling);
   const grasp::Plan plan = links_.vision->plan(chooser_.plan_options(resort_, failed), places);
   std::vector<std::string> why;
-  choice_ = chooser_.choose(plan, now().filling, here(), why);
+  choice_ = chooser_.choose(plan, now().filling, here(), wheres(), to_avoid(), why);
   report_.plan_ms += watch.ms();
   report_.refused = plan.reasons;
   report_.resort = resort_;
@@ -187,13 +205,13 @@ Phase Run::pick() {
   report_.base_from_tcp = grasp.at(grasp::Step::pick)->base_from_tcp;
   report_.score = grasp.score, report_.terms = grasp.terms;
   turns_ = 0;
-  const bool held = carry_out_pick(choice, scene_);
+  const bool held = carry_out_pick(choice, scene_, false);
   if (held) {
     failures_ = pushes_ = 0;
     resort_ = Resort::none;
     return Phase::place;
   }
-  failed_.push_back({{report_.base_from_tcp, grasp.gripper}, scene_});
+  failed_.push_back({{report_.base_from_tcp, grasp.gripper}, report_.base_from_part.translation(), scene_});
   tell("missed");
   if (++failures_ >= kMostFailures)
     return finish("not_pickable", std::to_string(failures_) + " grips in a row held nothing; look at the gripper");
@@ -203,7 +221,7 @@ Phase Run::pick() {
 Phase Run::place() {
   const Entry held = *now().in_hand;
   std::optional<Placing> placing;
-  for (const Chooser::Where where : {Chooser::Where::slots, Chooser::Where::station, Chooser::Where::turned})
+  for (const Chooser::Where where : wheres())
     if (!placing) placing = chooser_.place(held, now().filling, here(), where);
   if (!placing) return in_doubt("the gripper holds " + held.part + ", and no open slot can be reached with it");
   travel(placing->stops[0].base_from_tcp, held.gripper);
@@ -235,12 +253,14 @@ Phase Run::regrasp() {
   for (const Failed& f : failed_) options.failed.push_back(f.pick);
   Places places = chooser_.places(now().filling);
   const grasp::Plan plan = links_.vision->plan_standing(standing.part, standing.base_from_part, options, places);
-  const auto give_up = [&](const std::string& why) {
-    return finish("not_pickable",
-                  standing.part + " stands at the station and " + why + "; take it away, then say --slot-is empty");
+  const auto give_up = [&](const std::string& why) {  // the others go on without a station
+    station_trouble_ = standing.part + " stands at the station and " + why + ": take it away, then say --slot-is empty";
+    failures_ = 0;
+    tell("no_pick", station_trouble_);
+    return Phase::scan;
   };
   // To a slot; or, where it stands turned over, to where it stands as in a slot.
-  for (const Chooser::Where where : {Chooser::Where::slots, Chooser::Where::station, Chooser::Where::turned})
+  for (const Chooser::Where where : kAll)
     for (const grasp::Grasp& grasp : plan.grasps) {
       Entry held = standing;
       held.gripper = grasp.gripper, held.opening_mm = grasp.opening_before_mm;
@@ -258,11 +278,12 @@ Phase Run::regrasp() {
       choice.grasp = grasp;
       choice.part.base_from_part = standing.base_from_part;
       choice.placing = *placing;
-      if (carry_out_pick(choice, standing.scene)) {
+      if (carry_out_pick(choice, standing.scene, true)) {
         failures_ = 0;
         return Phase::place;
       }
-      failed_.push_back({{grasp.at(grasp::Step::pick)->base_from_tcp, grasp.gripper}, scene_});
+      failed_.push_back(
+          {{grasp.at(grasp::Step::pick)->base_from_tcp, grasp.gripper}, standing.base_from_part.translation(), scene_});
       tell("missed", "at the station");
       return ++failures_ >= kMostFailures ? give_up("is not gripped") : Phase::regrasp;
     }
@@ -313,7 +334,7 @@ CycleReport plan_first(const WorkCell& cell, const robot::RobotModel& robot, Vis
     const Stopwatch watch;
     const grasp::Plan plan = vision.plan(chooser.plan_options(resort, {}), chooser.places(filling));
     std::vector<std::string> why;
-    const auto choice = chooser.choose(plan, filling, {}, why);
+    const auto choice = chooser.choose(plan, filling, {}, kAll, {}, why);
     report.plan_ms += watch.ms();
     report.resort = resort;
     report.refused = plan.reasons;

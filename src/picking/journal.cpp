@@ -76,7 +76,7 @@ void follow(JournalState& state, const Entry& entry, const std::string& where) {
       break;
     case Event::picked:
       state.open.reset();
-      state.at_station.reset();  // it was there, if it was anywhere: no other part is picked before
+      if (entry.from_station) state.at_station.reset();
       state.in_hand = entry;
       break;
     case Event::missed:

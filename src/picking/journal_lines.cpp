@@ -14,7 +14,7 @@ constexpr std::array kNames = {"new_rack", "pick_ordered", "picked", "missed",  
 Entry entry_of(const io::JsonPlace& line) {
   line.must_be_object("a journal entry");
   line.only_keys({"event", "cycle", "scene", "part", "gripper", "grasp", "slot", "base_from_part", "tcp_from_part",
-                  "opening_mm", "note"});
+                  "opening_mm", "from_station", "note"});
   const auto text = [&line](const char* key) {
     return line.has(key) ? line.at(key, "a text").text("a text") : std::string();
   };
@@ -31,6 +31,11 @@ Entry entry_of(const io::JsonPlace& line) {
   entry.part = text("part"), entry.gripper = text("gripper"), entry.grasp = text("grasp"), entry.note = text("note");
   if (line.has("base_from_part")) entry.base_from_part = io::pose_of(line.at("base_from_part", "a pose"));
   if (line.has("tcp_from_part")) entry.tcp_from_part = io::pose_of(line.at("tcp_from_part", "a pose"));
+  if (line.has("from_station")) {
+    const io::JsonPlace from = line.at("from_station", "true or false");
+    if (!from.value().is_boolean()) from.fail("true or false");
+    entry.from_station = from.value().get<bool>();
+  }
   if (line.has("opening_mm")) entry.opening_mm = line.at("opening_mm", "mm").number(0, 1e5, "a length in mm");
   return entry;
 }
@@ -50,6 +55,7 @@ std::string line_of(const Entry& entry) {
     json["grasp"] = entry.grasp;
     json["slot"] = entry.slot;
     json["opening_mm"] = entry.opening_mm;
+    if (entry.from_station) json["from_station"] = true;
     json["base_from_part"] = io::json_of(entry.base_from_part);
     json["tcp_from_part"] = io::json_of(entry.tcp_from_part);
   } else if (entry.slot) {

@@ -68,7 +68,7 @@ void Run::travel(const Pose& to, const std::string& gripper) {
   order(entry, robot::CycleCommand::way_points, *stops, gripper, 0, 0);
 }
 
-bool Run::carry_out_pick(const Choice& choice, int scene) {
+bool Run::carry_out_pick(const Choice& choice, int scene, bool from_station) {
   const grasp::Grasp& grasp = choice.grasp;
   std::vector<Stop> stops;
   const grasp::PathPoint* entry_point = grasp.at(grasp::Step::entry);
@@ -87,6 +87,7 @@ bool Run::carry_out_pick(const Choice& choice, int scene) {
   entry.scene = scene;
   entry.part = grasp.part_name, entry.gripper = grasp.gripper, entry.grasp = grasp.family;
   entry.slot = choice.placing.slot ? choice.placing.slot->number : 0;
+  entry.from_station = from_station;
   entry.base_from_part = choice.part.base_from_part;
   entry.tcp_from_part = grasp.part_from_tcp.inverse();
   entry.opening_mm = grasp.opening_before_mm;

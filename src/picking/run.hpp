@@ -31,14 +31,17 @@ class Run {
   /// Through way points to where `to` begins. \throws Error device where no way is in reach
   void travel(const Pose& to, const std::string& gripper);
   void note_end(const Entry& order, robot::CycleResult result);
-  bool carry_out_pick(const Choice& choice, int scene);
+  bool carry_out_pick(const Choice& choice, int scene, bool from_station);
   const Chooser::Start& here();
 
   Phase finish(const std::string& status, const std::string& message);
   Phase next_resort();
   void tell(const std::string& state, const std::string& note = {});
   const JournalState& now() const { return journal_.state(); }
-  Filling filling() const { return journal_.state().filling; }
+  /// The kinds of place that a part may go to now.
+  std::vector<Chooser::Where> wheres() const;
+  /// Parts that a gripper has missed twice where they lie.
+  std::vector<Chooser::Avoid> to_avoid() const;
 
   const RunLinks& links_;
   const RunOptions& options_;
@@ -50,8 +53,10 @@ class Run {
   Resort resort_ = Resort::none;
   int scene_ = 0, pushes_ = 0, failures_ = 0, turns_ = 0;
   double scan_s_ = 0;
+  std::string station_trouble_;  ///< why what stands at the station stays there; empty = it does not
   struct Failed {
     grasp::FailedPick pick;
+    Vec3 part_at;
     int scene;
   };
   std::vector<Failed> failed_;

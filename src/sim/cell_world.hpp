@@ -50,6 +50,7 @@ class CellWorld {
   };
 
   void drop_parts(const SimulatedCellOptions& options);
+  Pose upright_at_wall(const Solid& solid, int number, double above_mm);
   void add_tools(const WorkCell& cell);
   Pose true_tcp(const controller_sim::Machine& machine) const;
   void set_opening(Tool& tool, const controller_sim::Machine& machine);

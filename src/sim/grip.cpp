@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <vector>
 
 #include "sim/solid.hpp"
@@ -12,15 +13,17 @@ namespace {
 constexpr double kGravity = 9.81;
 // Points of the shell that are that near to the one touched first are touched as well: pads and parts give way so far.
 constexpr double kSeat_mm = 0.3;
+constexpr double kInJaw_mm = 5;   // less than any jaw is thick
 constexpr double kTight_mm = 1;   // what the lip of a cup follows
 constexpr double kReach_mm = 3;   // how far a cup's bellows draw a part near, or are pressed in
 constexpr double kCupSafety = 2;  // of a cup's force, for the acceleration of the arm
 
 struct Contact {
-  double at = 0;  ///< along the jaw's direction from the tool's axis
-  Vec3 middle = Vec3::Zero();
-  double across = 0;  ///< best cosine between the surface's normal and the jaw's direction
+  double at = 0;             ///< along the jaw's direction from the tool's axis
+  std::vector<Vec3> points;  ///< that are touched, frame of the TCP
+  double across = 0;         ///< best cosine between the surface's normal and the jaw's direction
   bool any = false;
+  bool through = false;  ///< the part goes on where the jaw is
 };
 
 /// Where a jaw that comes along -direction (inside: along it) touches first, of what lies between the jaws (inside:
@@ -30,6 +33,7 @@ Contact first_touch(const Solid::State& part, const Pose& tcp_from_part, const g
   const Vec3 side = Vec3::UnitZ().cross(direction);
   const double sense =
       gripper.inside ? -1 : 1;  // an outer jaw meets the farthest point first, an inner one the nearest
+  Contact contact;
   std::vector<std::pair<double, const Vec3f*>> met;
   double best = -1e30;
   for (const Vec3f& point : part.shell.points) {
@@ -37,64 +41,122 @@ Contact first_touch(const Solid::State& part, const Pose& tcp_from_part, const g
     if (std::abs(p.dot(side)) > gripper.pad.width_mm / 2) continue;
     if (p.z() > gripper.pad.tip_mm || p.z() < gripper.pad.tip_mm - gripper.pad.length_mm) continue;
     const double s = p.dot(direction);
+    const double beyond = s - opening_mm / 2;
+    contact.through = contact.through || (!gripper.inside && beyond > kSeat_mm && beyond < kInJaw_mm);
     if (gripper.inside ? s <= 0 : std::abs(s) > opening_mm / 2 + kSeat_mm) continue;
     met.push_back({sense * s, &point});
     best = std::max(best, sense * s);
   }
-  Contact contact;
-  int count = 0;
+  const grasp::Pad& pad = gripper.pad;
+  const double rim_mm = 1.5 * part.diameter / 64;  // what lies on the rim of a pad: the shell's spacing, and a half
   for (const auto& [s, point] : met) {
     if (s < best - kSeat_mm) continue;
+    const Vec3 p = tcp_from_part * point->cast<double>();
+    contact.points.push_back(p);
+    const bool inside_pad = std::abs(p.dot(side)) < pad.width_mm / 2 - rim_mm && p.z() < pad.tip_mm - rim_mm &&
+                            p.z() > pad.tip_mm - pad.length_mm + rim_mm;
+    if (inside_pad) {  // whatever the part is like there, the flat of the pad meets it
+      contact.across = 1;
+      continue;
+    }
     Vec3f normal;
     part.field.at(*point, normal);
-    const Vec3 n = tcp_from_part.linear() * normal.cast<double>();
-    contact.across = std::max(contact.across, sense * n.dot(direction));
-    contact.middle += tcp_from_part * point->cast<double>();
-    ++count;
+    contact.across = std::max(contact.across, sense * (tcp_from_part.linear() * normal.cast<double>()).dot(direction));
   }
-  if (count == 0) return contact;
+  if (contact.points.empty()) return contact;
   contact.any = true;
-  contact.middle /= count;
   contact.at = sense * best;
   return contact;
 }
 
-Grip close_jaws(const grasp::GripperShape& gripper, double opening_mm, const Solid::State& part,
-                const Pose& tcp_from_part, double friction, double mass_kg) {
-  const int jaws = gripper.jaws;
+/// What the jaws meet, and how far they stand open then.
+struct Closed {
   std::vector<Vec3> directions;
   std::vector<Contact> contacts;
-  Grip grip;
-  for (int k = 0; k < jaws; ++k) {
-    const double angle = 2 * kPi * k / jaws;
-    directions.push_back(Vec3(std::cos(angle), std::sin(angle), 0));
-    contacts.push_back(first_touch(part, tcp_from_part, gripper, opening_mm, directions.back()));
-    grip.touches = grip.touches || contacts.back().any;
+  double mean = 0;  ///< of their ways from the axis
+  bool all = true, any = false;
+};
+Closed close_on(const grasp::GripperShape& gripper, double opening_mm, const Solid::State& part,
+                const Pose& tcp_from_part) {
+  Closed closed;
+  for (int k = 0; k < gripper.jaws; ++k) {
+    const double angle = 2 * kPi * k / gripper.jaws;
+    closed.directions.push_back(Vec3(std::cos(angle), std::sin(angle), 0));
+    closed.contacts.push_back(first_touch(part, tcp_from_part, gripper, opening_mm, closed.directions.back()));
+    closed.all = closed.all && closed.contacts.back().any;
+    closed.any = closed.any || closed.contacts.back().any;
+    closed.mean += closed.contacts.back().at / gripper.jaws;
   }
+  return closed;
+}
+
+/// Cosine between the jaws' way and the best line from one contact to the other: pads press where they are met.
+double straightest(const Contact& a, const Contact& b) {
+  double best = 0;
+  for (const Vec3& p : a.points)
+    for (const Vec3& q : b.points) best = std::max(best, std::abs((p - q).normalized().x()));
+  return best;
+}
+
+/// Two outer jaws press a part until it can turn no further: the nearest least width over turns about the tool and
+/// about the jaws' height.
+Pose aligned(const grasp::GripperShape& gripper, double opening_mm, const Solid::State& part, Pose tcp_from_part) {
+  constexpr double kSteps[] = {2 * kDegree, 0.5 * kDegree, 0.1 * kDegree};
+  constexpr int kMostSteps = 8;      // of each size: beyond 20 deg it is another grasp
+  constexpr double kGain_mm = 0.02;  // less is the spacing of the points
+  double width = close_on(gripper, opening_mm, part, tcp_from_part).mean;
+  for (const double step : kSteps)
+    for (int i = 0; i < kMostSteps; ++i) {
+      std::optional<Pose> better;
+      for (const Vec3& axis : {Vec3(Vec3::UnitZ()), Vec3(Vec3::UnitY())})
+        for (const double sign : {-1.0, 1.0}) {
+          Pose turned = tcp_from_part;
+          turned.linear() = rotation_from_vector(sign * step * axis) * tcp_from_part.linear();
+          turned.translation() = rotation_from_vector(sign * step * axis) * tcp_from_part.translation();
+          const Closed now = close_on(gripper, opening_mm, part, turned);
+          if (!now.all || now.mean > width - kGain_mm) continue;
+          width = now.mean;
+          better = turned;
+        }
+      if (!better) break;
+      tcp_from_part = *better;
+    }
+  return tcp_from_part;
+}
+
+Grip close_jaws(const grasp::GripperShape& gripper, double opening_mm, const Solid::State& part,
+                const Pose& tcp_from_part, double friction, double mass_kg) {
+  Grip grip;
   const auto refuse = [&grip](const char* why) {
     grip.why = why;
     return grip;
   };
-  for (const Contact& contact : contacts)
-    if (!contact.any) return refuse("a jaw meets nothing");
+  Closed closed = close_on(gripper, opening_mm, part, tcp_from_part);
+  grip.touches = closed.any;
+  if (!closed.all) return refuse("a jaw meets nothing");
+  for (const Contact& contact : closed.contacts)
+    if (contact.through) return refuse("the part is wider than the jaws stand open");
+  Pose seated = tcp_from_part;
+  if (gripper.jaws == 2 && !gripper.inside) {
+    seated = aligned(gripper, opening_mm, part, tcp_from_part);
+    closed = close_on(gripper, opening_mm, part, seated);
+  }
   // Jaws move by the same way: the part is shifted until it is as far from the axis at each.
-  double mean = 0;
-  for (const Contact& contact : contacts) mean += contact.at / jaws;
-  const double share = jaws == 2 ? 0.5 : 2.0 / jaws;  // least squares over the directions
-  for (int k = 0; k < jaws; ++k) grip.shift_mm += share * (mean - contacts[k].at) * directions[k];
-  grip.opening_mm = 2 * mean;
-  if (!gripper.inside && grip.opening_mm > opening_mm) return refuse("the part is wider than the jaws stand open");
+  Vec3 shift = Vec3::Zero();
+  const double share = gripper.jaws == 2 ? 0.5 : 2.0 / gripper.jaws;  // least squares over the directions
+  for (int k = 0; k < gripper.jaws; ++k) shift += share * (closed.mean - closed.contacts[k].at) * closed.directions[k];
+  seated.translation() += shift;
+  grip.motion = seated * tcp_from_part.inverse();
+  grip.opening_mm = 2 * closed.mean;
   if (gripper.inside && grip.opening_mm < opening_mm) return refuse("the hole is narrower than the jaws");
   if (grip.opening_mm < gripper.stroke_min() || grip.opening_mm > gripper.stroke_max())
     return refuse("the part's width is outside of the stroke");
   const double cone = std::cos(std::atan(friction));
-  for (const Contact& contact : contacts)
+  for (const Contact& contact : closed.contacts)
     if (contact.across < cone) return refuse("the surface slants: it slips out of the jaws");
-  if (jaws == 2) {
-    const Vec3 line = (contacts[0].middle - contacts[1].middle).normalized();
-    if (std::abs(line.x()) < cone) return refuse("the contacts are not opposite each other: it turns out of the jaws");
-  }
-  if (gripper.gripper.force_n > 0 && jaws * friction * gripper.gripper.force_n < mass_kg * kGravity)
+  if (gripper.jaws == 2 && straightest(closed.contacts[0], closed.contacts[1]) < cone)
+    return refuse("the contacts are not opposite each other: it turns out of the jaws");
+  if (gripper.gripper.force_n > 0 && gripper.jaws * friction * gripper.gripper.force_n < mass_kg * kGravity)
     return refuse("the force does not carry the part");
   grip.holds = true;
   return grip;
@@ -133,7 +195,7 @@ Grip close_cup(const grasp::GripperShape& gripper, const Solid::State& part, con
     grip.why = "the force does not carry the part";
   } else {
     grip.holds = true;
-    grip.shift_mm.z() = -(low + high) / 2;
+    grip.motion.translation().z() = -(low + high) / 2;
   }
   return grip;
 }

@@ -1,5 +1,5 @@
 // Simulated cells from full bin to full rack: what is placed, how, and what is left.
-// usage: campaign_picking [BINS] [SEED] [--workcell FILE] [--parts N] [-v]
+// usage: campaign_picking [BINS] [SEED] [--workcell FILE] [--parts N] [--at-walls] [-v]
 #include <unistd.h>
 
 #include <algorithm>
@@ -68,13 +68,15 @@ void print(const char* name, const std::map<std::string, int>& counts) {
 int main(int argc, char** argv) try {
   int bins = 50, parts_in_bin = 15, numbers = 0;
   std::uint64_t seed = 1;
-  bool verbose = false;
+  bool verbose = false, at_walls = false;
   std::string file = std::string(TRIBIN_SOURCE_DIR) + "/examples/cells/pick_cell.toml";
   for (int i = 1; i < argc; ++i)
     if (std::strcmp(argv[i], "--workcell") == 0 && i + 1 < argc)
       file = argv[++i];
     else if (std::strcmp(argv[i], "--parts") == 0 && i + 1 < argc)
       parts_in_bin = std::atoi(argv[++i]);
+    else if (std::strcmp(argv[i], "--at-walls") == 0)
+      at_walls = true;
     else if (std::strcmp(argv[i], "-v") == 0)
       verbose = true;
     else if (numbers++ == 0)
@@ -99,6 +101,7 @@ int main(int argc, char** argv) try {
     sim::SimulatedCellOptions options;
     options.seed = seed + static_cast<std::uint64_t>(bin);
     options.parts = parts_in_bin;
+    options.at_walls = at_walls || bin % 5 == 4;  // every fifth bin has parts on end at walls and in corners
     sim::SimulatedCell simulated(cell, robot, stock, options);
     const auto vision = picking::open_vision({&cell, &parts, &simulated.camera(), &robot});
     const std::filesystem::path journal_file =

@@ -35,6 +35,7 @@ struct Entry {
   int scene = 0;  ///< that the part was found in
   std::string part, gripper, grasp;
   int slot = 0;                            ///< of places: 0 = the station for gripping anew
+  bool from_station = false;               ///< of picks
   Pose base_from_part = Pose::Identity();  ///< as it was measured
   Pose tcp_from_part = Pose::Identity();   ///< in the hand
   double opening_mm = 0;                   ///< of the jaws before they close, and when they let go

@@ -32,7 +32,7 @@ std::shared_ptr<const CellStock> make_cell_stock(std::vector<Mesh> meshes);
 struct SimulatedCellOptions {
   std::uint64_t seed = 1;
   int parts = 15;         ///< dropped into the bin, classes in turn; fewer where the bin is too small
-  bool at_walls = false;  ///< some of them are leant on the walls and put into the corners
+  bool at_walls = false;  ///< a quarter of them come last, on end at the walls and in the corners
   // What the program does not know: root mean squares, 3-D norms.
   double hand_eye_mm = 0.25, hand_eye_rad = 0.02 * kDegree;  ///< between the file's camera pose and the true one
   double robot_mm = 0.3;                                     ///< a smooth field over the cell

@@ -1,0 +1,285 @@
+#include "tribin/sim/work_cell.hpp"
+
+#include <gtest/gtest.h>
+
+#include <set>
+
+#include "sim/cell_errors.hpp"
+#include "sim/grip.hpp"
+#include "sim/live_heap.hpp"
+#include "sim/random.hpp"
+#include "support/solids.hpp"
+#include "tribin/config/robot_file.hpp"
+#include "tribin/io/cad_files.hpp"
+#include "tribin/picking/rack.hpp"
+#include "tribin/robot/handshake.hpp"
+
+namespace tribin::sim {
+namespace {
+
+const std::filesystem::path kSource = TRIBIN_SOURCE_DIR;
+
+Gripper jaws() {
+  Gripper gripper;
+  gripper.name = "jaw";
+  gripper.stroke_mm = {0, 100};
+  gripper.force_n = 100;
+  gripper.finger_mm = Vec3(8, 20, 60);
+  gripper.tip_mm = 5;
+  gripper.flange_from_tcp.translation() = Vec3(0, 0, 150);
+  return gripper;
+}
+
+Mesh block(const Vec3& size) {
+  Mesh mesh = bin_mesh({size.x(), size.y(), size.z(), 1});  // for its vertices' order only
+  mesh.vertices.clear();
+  mesh.triangles.clear();
+  for (int i = 0; i < 8; ++i)
+    mesh.vertices.push_back(Vec3f(static_cast<float>((i & 1 ? 0.5 : -0.5) * size.x()),
+                                  static_cast<float>((i & 2 ? 0.5 : -0.5) * size.y()),
+                                  static_cast<float>((i & 4 ? 0.5 : -0.5) * size.z())));
+  mesh.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
+                    {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
+  return mesh;
+}
+
+TEST(Grip, JawsCentreABlockAndHoldIt) {
+  const Mesh mesh = block(Vec3(40, 60, 30));
+  const Solid solid(mesh);
+  Pose tcp_from_part = Pose::Identity();
+  tcp_from_part.translation() = Vec3(3, 2, 0);
+  const Grip grip = close_gripper(grasp::gripper_shape(jaws()), 60, solid, tcp_from_part, 0.3, 1);
+  ASSERT_TRUE(grip.holds) << grip.why;
+  EXPECT_NEAR(grip.motion.translation().x(), -3, 0.1);
+  EXPECT_NEAR(grip.opening_mm, 40, 0.1);
+}
+
+TEST(Grip, NothingIsHeldThatPhysicsWouldLetGo) {
+  const Mesh mesh = block(Vec3(40, 60, 30));
+  const Solid solid(mesh);
+  const grasp::GripperShape shape = grasp::gripper_shape(jaws());
+  Pose here = Pose::Identity();
+  EXPECT_FALSE(close_gripper(shape, 39, solid, here, 0.3, 1).holds);   // wider than the jaws stand open
+  EXPECT_FALSE(close_gripper(shape, 60, solid, here, 0.3, 50).holds);  // too heavy
+  Pose beside = here;
+  beside.translation() = Vec3(0, 80, 0);
+  EXPECT_FALSE(close_gripper(shape, 60, solid, beside, 0.3, 1).touches);
+}
+
+TEST(Grip, JawsAlignWhatIsTurned) {
+  const Mesh mesh = block(Vec3(40, 60, 30));
+  const Solid solid(mesh);
+  for (const double degrees : {-12.0, -5.0, 3.0, 10.0}) {
+    Pose turned = Pose::Identity();
+    turned.linear() = rotation_from_vector(Vec3(0, 0, degrees * kDegree));
+    const Grip grip = close_gripper(grasp::gripper_shape(jaws()), 90, solid, turned, 0.3, 1);
+    ASSERT_TRUE(grip.holds) << degrees << grip.why;
+    EXPECT_LT(rotation_angle((grip.motion * turned).linear(), Matrix3::Identity()), 1 * kDegree) << degrees;
+    EXPECT_NEAR(grip.opening_mm, 40, 0.5);
+  }
+}
+
+TEST(Grip, AWedgeSlipsOut) {
+  for (const double slope : {10.0, 30.0}) {  // of both sides; friction 0.3 holds up to 17 deg
+    Mesh mesh = block(Vec3(40, 60, 60));
+    for (Vec3f& v : mesh.vertices) v.x() *= 1 + v.z() / 20 * static_cast<float>(std::tan(slope * kDegree));
+    const Solid solid(mesh);
+    EXPECT_EQ(close_gripper(grasp::gripper_shape(jaws()), 95, solid, Pose::Identity(), 0.3, 1).holds, slope < 17);
+  }
+}
+
+TEST(Grip, ACupWantsAFlatPlaceUnderItsWholeRim) {
+  const Mesh mesh = block(Vec3(60, 60, 20));
+  const Solid solid(mesh);
+  Gripper cup;
+  cup.name = "cup";
+  cup.kind = GripperKind::suction;
+  cup.cup_radius_mm = 10;
+  cup.force_n = 50;
+  cup.flange_from_tcp.translation() = Vec3(0, 0, 100);
+  const grasp::GripperShape shape = grasp::gripper_shape(cup);
+  Pose below = Pose::Identity();
+  below.translation() = Vec3(0, 0, 11);  // its top 1 mm beyond the cup's plane
+  EXPECT_TRUE(close_gripper(shape, 0, solid, below, 0.3, 1).holds);
+  Pose at_edge = below;
+  at_edge.translation().x() = 25;
+  EXPECT_FALSE(close_gripper(shape, 0, solid, at_edge, 0.3, 1).holds);
+  Pose tilted = below;
+  tilted.linear() = rotation_from_vector(Vec3(10 * kDegree, 0, 0));
+  EXPECT_FALSE(close_gripper(shape, 0, solid, tilted, 0.3, 1).holds);
+  EXPECT_FALSE(close_gripper(shape, 0, solid, below, 0.3, 10).holds);
+}
+
+TEST(LiveHeap, WhatLeansOnATakenPartFalls) {
+  const Mesh mesh = block(Vec3(60, 60, 40));
+  const Solid solid(mesh);
+  Pose low = Pose::Identity(), high = low;
+  low.translation() = Vec3(0, 0, 20.3);
+  high.translation() = Vec3(5, 0, 60.6);
+  LiveHeap heap({300, 300, 200, 5}, {&solid, &solid}, {low, high});
+  EXPECT_TRUE(heap.at_rest());
+  for (int i = 0; i < 100; ++i) heap.step();
+  EXPECT_TRUE(heap.at_rest());  // nothing moves by itself
+  heap.hold(0);
+  for (int i = 0; i < 200; ++i) {
+    Pose away = low;
+    away.translation() += Vec3(0, 0.6 * i, 0);
+    heap.move(0, away);
+    heap.step();
+  }
+  for (int i = 0; i < 1200 && !heap.at_rest(); ++i) heap.step();
+  EXPECT_TRUE(heap.at_rest());
+  EXPECT_LT(heap.pose(1).translation().z(), 45);
+}
+
+TEST(LiveHeap, WallsEndAtTheRim) {
+  const Mesh mesh = block(Vec3(20, 20, 20));
+  const Solid solid(mesh);
+  LiveHeap heap({300, 200, 100, 8}, {}, {});
+  const int tool = heap.add_tool(solid);
+  const auto depth_at = [&](const Vec3& at) {
+    Pose pose = Pose::Identity();
+    pose.translation() = at;
+    heap.move(tool, pose);
+    return heap.depth_in_walls_mm(tool);
+  };
+  EXPECT_EQ(depth_at(Vec3(0, 0, 11)), 0);
+  EXPECT_NEAR(depth_at(Vec3(0, 0, 8)), 2, 0.1);
+  EXPECT_NEAR(depth_at(Vec3(143, 0, 50)), 3, 0.2);
+  EXPECT_NEAR(depth_at(Vec3(0, -93, 50)), 3, 0.2);
+  EXPECT_EQ(depth_at(Vec3(150, 0, 115)), 0);
+  EXPECT_GT(depth_at(Vec3(150, 0, 105)), 1);
+}
+
+TEST(CellErrors, AreAsLargeAsTheySay) {
+  double field = 0, shift = 0, turn = 0;
+  int count = 0;
+  for (std::uint64_t seed = 1; seed <= 300; ++seed) {
+    const RobotField error(0.3, seed);
+    Random random(seed);
+    const Pose drawn = drawn_motion(0.25, 0.02, random);
+    shift += drawn.translation().squaredNorm();
+    turn += vector_from_rotation(drawn.linear()).squaredNorm();
+    for (int i = 0; i < 10; ++i, ++count)
+      field += error.error_at(Vec3(random.uniform(-1e3, 1e3), random.uniform(-1e3, 1e3), random.uniform(0, 1e3)))
+                   .squaredNorm();
+    const Vec3 here(500, 100, 50);
+    EXPECT_LT((error.error_at(here) - error.error_at(here + Vec3(5, 5, 5))).norm(), 0.1);  // smooth
+  }
+  EXPECT_NEAR(std::sqrt(field / count), 0.3, 0.03);
+  EXPECT_NEAR(std::sqrt(shift / 300), 0.25, 0.02);
+  EXPECT_NEAR(std::sqrt(turn / 300), 0.02, 0.002);
+}
+
+/// The example cell with a few batteries, the smallest of its parts.
+struct SmallCell {
+  SmallCell() : cell(read_work_cell(kSource / "examples/cells/pick_cell.toml")) {
+    cell.parts = {cell.parts.back()};
+    robot = read_robot(cell.robots.front().model);
+    stock = make_cell_stock({read_cad(cell.parts.front().cad)});
+  }
+  WorkCell cell;
+  robot::RobotModel robot;
+  std::shared_ptr<const CellStock> stock;
+};
+
+TEST(SimulatedCell, APickByTheHandshakeHoldsThePartAndAPlaceIsMeasured) {
+  const SmallCell small;
+  SimulatedCellOptions options;
+  options.parts = 1;
+  options.hand_eye_mm = options.hand_eye_rad = options.robot_mm = options.slip_mm = options.slip_rad = 0;
+  options.seed = 4;
+  SimulatedCell cell(small.cell, small.robot, small.stock, options);
+  const auto controller = cell.connect();
+  const PartTruth before = cell.truth().parts.front();
+  EXPECT_EQ(before.where, Whereabouts::in_bin);
+  // Down the part's own upright, across its short side.
+  const Matrix3& r = before.base_from_part.linear();
+  const Vec3 middle = before.base_from_part * Vec3(0, 0, 45);
+  int up = 0;
+  r.row(2).cwiseAbs().maxCoeff(&up);
+  const int across = up == 1 ? 0 : 1;  // 66 mm, or 110 mm where it lies on a long side
+  Pose tcp = Pose::Identity();
+  tcp.linear().col(2) = -Vec3::UnitZ();
+  Vec3 x = r.col(across);
+  x.z() = 0;
+  tcp.linear().col(0) = x.normalized();
+  tcp.linear().col(1) = tcp.linear().col(2).cross(tcp.linear().col(0));
+  tcp.translation() = middle;
+  const auto order = [&](robot::CycleCommand command, int cycle, const Pose& at) {
+    robot::CycleOrder order;
+    order.command = command;
+    order.cycle = cycle;
+    order.opening_mm = 140;
+    for (const double lift : {150.0, 0.0, 250.0}) {
+      Pose pose = at;
+      pose.translation().z() += lift;
+      order.positions.push_back(robot::position_from_pose(pose, 0, 1));
+    }
+    return run_cycle(*controller, cell.clock(), order);
+  };
+  ASSERT_EQ(order(robot::CycleCommand::pick, 1, tcp), robot::CycleResult::done)
+      << (cell.truth().failed_grips.empty() ? "" : cell.truth().failed_grips.back()) << '\n'
+      << before.base_from_part.matrix();
+  EXPECT_EQ(cell.truth().parts.front().where, Whereabouts::in_hand);
+  const std::vector<picking::Slot> slots = picking::slots_of(*small.cell.rack);
+  const Pose tcp_from_part = tcp.inverse() * before.base_from_part;
+  // Where it would stand in slot 3, 2 mm off.
+  Pose wanted = slots[2].base_from_slot;
+  wanted.translation().x() += 2;
+  ASSERT_EQ(order(robot::CycleCommand::place, 2, wanted * tcp_from_part.inverse()), robot::CycleResult::done);
+  const PartTruth after = cell.truth().parts.front();
+  EXPECT_EQ(after.where, Whereabouts::placed);
+  EXPECT_EQ(after.slot, 3);
+  EXPECT_NEAR(after.off_mm, 2, 0.5);
+  EXPECT_LT(after.off_rad, 0.2 * kDegree);
+  EXPECT_EQ(after.times_placed, 1);
+}
+
+TEST(SimulatedCell, TheSameSeedIsTheSameCell) {
+  const SmallCell small;
+  SimulatedCellOptions options;
+  options.parts = 3;
+  options.at_walls = true;
+  std::vector<Pose> first;
+  for (int run = 0; run < 2; ++run) {
+    SimulatedCell cell(small.cell, small.robot, small.stock, options);
+    const std::vector<PartTruth> parts = cell.truth().parts;
+    for (std::size_t i = 0; i < parts.size(); ++i) {
+      if (run == 0)
+        first.push_back(parts[i].base_from_part);
+      else
+        EXPECT_EQ(parts[i].base_from_part.matrix(), first[i].matrix());
+    }
+  }
+}
+
+TEST(SimulatedCell, TouchingThePartOrTheBinIsNoted) {
+  const SmallCell small;
+  SimulatedCellOptions options;
+  options.parts = 1;
+  SimulatedCell cell(small.cell, small.robot, small.stock, options);
+  const auto controller = cell.connect();
+  robot::CycleOrder order;
+  order.command = robot::CycleCommand::way_points;
+  const Vec3 part = cell.truth().parts.front().base_from_part.translation();
+  int cycle = 0;
+  const auto go_to = [&](const Vec3& at) {
+    Pose pose = Pose::Identity();
+    pose.linear() = rotation_from_vector(Vec3(kPi, 0, 0));
+    pose.translation() = at;
+    order.cycle = ++cycle;
+    order.positions = {robot::position_from_pose(pose, 0, 1)};
+    run_cycle(*controller, cell.clock(), order);
+    return cell.truth().collisions.size();
+  };
+  EXPECT_EQ(go_to(Vec3(1300, 0, 500)), 0u);
+  const std::size_t wall = go_to(Vec3(1300 + 280, 0, 100));  // the bin's half width is 280
+  EXPECT_GT(wall, 0u);
+  go_to(Vec3(1300, 0, 500));
+  const std::size_t before = go_to(part + Vec3(0, 0, 300));
+  EXPECT_GT(go_to(part + Vec3(75, 0, 30)), before);
+}
+
+}  // namespace
+}  // namespace tribin::sim
