@@ -142,6 +142,21 @@ inline PartHere here(const Known& known, const Pose& base_from_part, double sigm
 /// A camera a metre above the origin, looking down.
 inline Pose camera_above(double height = 1000) { return at(0, 0, height, Vec3(kPi, 0, 0)); }
 
+/// A bin of 300 x 240 x 100 mm on the floor, below that camera.
+inline Scene in_bin() {
+  Scene scene;
+  scene.base_from_camera = camera_above();
+  CellBin bin;
+  bin.inner_size_mm = Vec3(300, 240, 100);
+  scene.bin = bin;
+  return scene;
+}
+
+inline const Known& rod() {
+  static const Known known(cylinder_mesh(14, 60));
+  return known;
+}
+
 /// What it sees of parts on the floor, and of other meshes.
 inline Scan seen(const Scene& scene, std::vector<std::pair<const Mesh*, Pose>> others = {}, unsigned seed = 1) {
   std::vector<std::pair<const Mesh*, Pose>> things;

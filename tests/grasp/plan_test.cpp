@@ -10,26 +10,14 @@ namespace {
 
 using test::at;
 using test::here;
+using test::in_bin;
 using test::Known;
 using test::on_floor;
+using test::rod;
 
-const Known& rod() {
-  static const Known known(test::cylinder_mesh(14, 60));
-  return known;
-}
 const Known& block() {
   static const Known known(test::box_mesh(Vec3(50, 30, 40)));
   return known;
-}
-
-/// A bin of 300 x 240 x 100 mm on the floor.
-Scene in_bin() {
-  Scene scene;
-  scene.base_from_camera = test::camera_above();
-  CellBin bin;
-  bin.inner_size_mm = Vec3(300, 240, 100);
-  scene.bin = bin;
-  return scene;
 }
 
 Mesh bin_walls(const CellBin& bin) {

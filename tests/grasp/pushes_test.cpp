@@ -6,22 +6,10 @@ namespace tribin::grasp {
 namespace {
 
 using test::here;
+using test::in_bin;
 using test::Known;
 using test::on_floor;
-
-const Known& rod() {
-  static const Known known(test::cylinder_mesh(14, 60));
-  return known;
-}
-
-Scene in_bin() {
-  Scene scene;
-  scene.base_from_camera = test::camera_above();
-  CellBin bin;
-  bin.inner_size_mm = Vec3(300, 240, 100);
-  scene.bin = bin;
-  return scene;
-}
+using test::rod;
 
 TEST(PlanPushes, LeadFromTheWallToTheMiddle) {
   // Too near to a wall for a finger behind it, and along it.
