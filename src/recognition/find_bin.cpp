@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "rim_place.hpp"
 #include "rim_search.hpp"
 #include "tribin/core/parallel.hpp"
 #include "tribin/pose/refine.hpp"
@@ -18,26 +19,43 @@ using Mat6 = Eigen::Matrix<double, 6, 6>;
 using Vec6 = Eigen::Matrix<double, 6, 1>;
 
 // A hand-eye calibration that does not say how good it is, is taken as a good one.
-constexpr double kHandEyeMm = 0.3, kHandEyeRad = 0.03 * kDegree;
+constexpr double kHandEyeMm = 0.25, kHandEyeRad = 0.02 * kDegree;
 
 // Bins are moulded or welded: their sides keep to about 0.05 % of their length (DIN 16742, TG 6).
 constexpr double kShapeSigma = 5e-4;
 
+// Triangles of bin_mesh: floor, inner walls, rim; then outer walls and the underside, which tell of a table as well.
+constexpr int kFloorEnd = 2, kWallsEnd = 10, kRimEnd = 18;
+
 /// The bin as the fit sees it.
 struct BinModel {
+  BinShape shape;
   RenderMesh mesh;
-  Vec3 middle = Vec3::Zero();  ///< of the inner volume, bin frame
-  double lever_mm = 0;         ///< turns radians into mm
+  RenderMesh level;                ///< floor and rim alone: walls are seen so flat that they are measured badly
+  Vec3 middle = Vec3::Zero();      ///< of the inner volume, bin frame
+  Vec3 rim_middle = Vec3::Zero();  ///< of the rim
+  double lever_mm = 0;             ///< turns radians into mm
   double longest_mm = 0;
+  double near_mm = 0;         ///< what lies within this of the model is on it: 1 % of its longest side
+  double start_scale_mm = 0;  ///< how far a start may be off: a wall, or as much
 };
 
 BinModel model_of(const BinShape& shape) {
   BinModel out;
-  out.mesh = make_render_mesh(bin_mesh(shape));
+  out.shape = shape;
+  Mesh mesh = bin_mesh(shape);
+  out.mesh = make_render_mesh(mesh);
+  const std::vector<std::array<std::uint32_t, 3>> all = mesh.triangles;
+  mesh.triangles.assign(all.begin(), all.begin() + kFloorEnd);
+  mesh.triangles.insert(mesh.triangles.end(), all.begin() + kWallsEnd, all.begin() + kRimEnd);
+  out.level = make_render_mesh(mesh);
   out.middle = Vec3(0, 0, shape.inner_size_mm.z() / 2);
+  out.rim_middle = Vec3(0, 0, shape.inner_size_mm.z());
   // Of a rectangle's area about its middle.
   out.lever_mm = std::hypot(shape.inner_size_mm.x(), shape.inner_size_mm.y()) / std::sqrt(12.0);
   out.longest_mm = std::max(shape.inner_size_mm.x(), shape.inner_size_mm.y());
+  out.near_mm = 0.01 * out.longest_mm;
+  out.start_scale_mm = std::max(shape.wall_mm, out.near_mm);
   return out;
 }
 
@@ -47,32 +65,48 @@ struct Counts {
   int all() const { return supported + violated + hidden + unmeasured; }
 };
 
-/// Floor apart from rim and inner walls: any level surface supports the floor.
+/// Floor apart from the rim: any level surface supports the floor.
 struct Look {
-  Counts floor, sides;
-  double spread_mm = 0;  ///< robust sd of what lies near the model, along its normals
-  Verification outline;  ///< of the outer edge of the rim: a level surface beyond it is no bin
+  Counts floor, walls, rim;
+  double rim_in_view = 0;  ///< share of the rim that lies in the image
+  double spread_mm = 0;    ///< robust sd of what lies near the model, along its normals
+  Verification outline;    ///< of the outer edge of the rim: a level surface beyond it is no bin
 
   double score() const {
-    const int all = floor.all() + sides.all();
-    return all == 0 ? -1 : (floor.supported + sides.supported - 3.0 * (floor.violated + sides.violated)) / all;
+    const int violated = floor.violated + walls.violated + rim.violated;
+    return (rim.supported + 0.2 * (floor.supported + walls.supported) - 3.0 * violated) / std::max(1, rim.all()) *
+           rim_in_view;
   }
 };
 
-/// \param near_mm  what lies within this of the model is on it.
-Look look_at(const BinModel& model, const SceneDepth& scene, const Pose& pose, int step, double near_mm) {
+double share_in_view(const BinShape& shape, const PinholeCamera& camera, const Pose& pose) {
+  const double x = (shape.inner_size_mm.x() + shape.wall_mm) / 2, y = (shape.inner_size_mm.y() + shape.wall_mm) / 2;
+  constexpr int kSamples = 64;
+  int inside = 0;
+  for (int k = 0; k < kSamples; ++k) {
+    const double t = 2.0 * (k % 16 + 0.5) / 16 - 1;
+    const Eigen::Vector2d on =
+        k < 32 ? Eigen::Vector2d(k < 16 ? x : -x, t * y) : Eigen::Vector2d(t * x, k < 48 ? y : -y);
+    const Vec3 p = pose * Vec3(on.x(), on.y(), shape.inner_size_mm.z());
+    if (!(p.z() > 0)) continue;
+    const Vec2 q = camera.project(p);
+    inside += q.x() >= 0 && q.y() >= 0 && q.x() < camera.width && q.y() < camera.height;
+  }
+  return double(inside) / kSamples;
+}
+
+Look look_at(const BinModel& model, const SceneDepth& scene, const Pose& pose, int step) {
   IndexRender render;
   render_index(model.mesh, scene.camera, pose, step, render);
   Look out;
+  out.rim_in_view = share_in_view(model.shape, scene.camera, pose);
   std::vector<float> residuals;
   for (int j = 0; j < render.height; ++j)
     for (int i = 0; i < render.width; ++i) {
       const std::int32_t k = render.triangle[render.index(i, j)];
       if (k < 0) continue;
-      // Of bin_mesh: two triangles of floor, eight each of inner walls and rim; then outer walls and the underside,
-      // which tell of a table as well.
-      if (k >= 18) continue;
-      Counts& counts = k < 2 ? out.floor : out.sides;
+      if (k >= kRimEnd) continue;
+      Counts& counts = k < kFloorEnd ? out.floor : k < kWallsEnd ? out.walls : out.rim;
       const int u = render.u0 + i * step, v = render.v0 + j * step;
       const double z = scene.z_mm(u, v), z_model = 1.0 / render.inverse_z[render.index(i, j)];
       if (!(z > 0)) {
@@ -82,7 +116,7 @@ Look look_at(const BinModel& model, const SceneDepth& scene, const Pose& pose, i
       const Vec3f& n = render.normal[static_cast<std::size_t>(k)];
       const Vec3 ray = scene.camera.ray(u, v);
       const double r = (z - z_model) * (n[0] * ray.x() + n[1] * ray.y() + n[2] * ray.z());  // > 0: before the surface
-      if (std::abs(r) < near_mm) {
+      if (std::abs(r) < model.near_mm) {
         ++counts.supported;
         residuals.push_back(static_cast<float>(std::abs(r)));
       } else if (r > 0) {
@@ -97,24 +131,48 @@ Look look_at(const BinModel& model, const SceneDepth& scene, const Pose& pose, i
   }
   VerificationOptions options;
   options.step_px = step;
-  options.tolerance_mm = near_mm;
+  options.tolerance_mm = model.near_mm;
   options.diameter_mm = model.longest_mm;
   out.outline = verify_pose(model.mesh, scene, pose, options);
   return out;
 }
 
-Refinement fitted(const BinModel& model, const SceneDepth& scene, const Pose& start, int step, double start_scale_mm,
-                  int iterations) {
-  RefineOptions options;
-  options.iterations = iterations;
-  options.step_px = step;
-  options.start_scale_mm = start_scale_mm;
-  options.center = model.middle;
-  options.lever_mm = model.lever_mm;
-  options.outlines = true;  // walls are seen too flat to be measured, mostly: rim and floor slide without them
-  // Beyond it the fit would tell less than where a bin stands without looking.
-  options.weak_mm = 0.01 * model.longest_mm;
-  return refine_pose(model.mesh, scene, start, options);
+/// A pose on the scan, with the information that holds it.
+struct BinFit {
+  Pose camera_from_bin = Pose::Identity();
+  Matrix6 information = Matrix6::Zero();  ///< as of Refinement
+  double rms_sigma = 0;
+};
+
+/// Height and tilt by rim and floor; place and turn in the rim's plane by the rim. The one moves about the rim's
+/// middle, so that it does not spoil the other.
+BinFit fitted(const BinModel& model, const SceneDepth& scene, const Pose& start, int step, double start_scale_mm) {
+  BinFit out;
+  const Scan& scan = *scene.surfels->scan;
+  const int rim_step = std::max(1, step / 2);
+  out.camera_from_bin = place_on_rim(model.shape, scan, start, start_scale_mm, rim_step).camera_from_bin;
+  for (const double reach : {0.5 * start_scale_mm, 0.1 * start_scale_mm}) {
+    RefineOptions options;
+    options.iterations = 8;
+    options.step_px = step;
+    options.start_scale_mm = 2 * reach;
+    options.center = model.rim_middle;
+    options.lever_mm = model.lever_mm;
+    // Beyond it the fit would tell less than where a bin stands without looking.
+    options.weak_mm = model.near_mm;
+    const Eigen::Matrix3d axes = out.camera_from_bin.linear();
+    Eigen::Matrix<double, 6, 3> in_plane = Eigen::Matrix<double, 6, 3>::Zero();
+    in_plane.topLeftCorner<3, 2>() = axes.leftCols<2>();
+    in_plane.bottomRightCorner<3, 1>() = axes.col(2);
+    for (int k = 0; k < 3; ++k) options.frozen.push_back(Vector6(in_plane.col(k)));
+    const Refinement fit = refine_pose(model.level, scene, out.camera_from_bin, options);
+    const RimPlace place = place_on_rim(model.shape, scan, fit.camera_from_part, reach, rim_step);
+    out.camera_from_bin = place.camera_from_bin;
+    const Mat6 keep = Mat6::Identity() - in_plane * in_plane.transpose();
+    out.information = keep * Mat6(fit.information) * keep + in_plane * place.information * in_plane.transpose();
+    out.rms_sigma = fit.rms_sigma;
+  }
+  return out;
 }
 
 int step_of(const SceneDepth& scene, double pixels) {
@@ -155,8 +213,8 @@ Mat6 moved_by_camera(const Vec3& at, double sigma_mm, double sigma_rad) {
   return j * variance.asDiagonal() * j.transpose();
 }
 
-/// Of the fit, about the middle: noise, the sensor's smooth errors, and how the bin differs from its model.
-Mat6 covariance_of(const BinModel& model, const SceneDepth& scene, const Refinement& fit, int step) {
+/// Of the fit, about the rim's middle: noise, the sensor's smooth errors, and how the bin differs from its model.
+Mat6 covariance_of(const BinModel& model, const SceneDepth& scene, const BinFit& fit, int step) {
   Vec6 scale;
   scale << 1, 1, 1, 1 / model.lever_mm, 1 / model.lever_mm, 1 / model.lever_mm;
   const Mat6 h = scale.asDiagonal() * Mat6(fit.information) * scale.asDiagonal();
@@ -167,9 +225,9 @@ Mat6 covariance_of(const BinModel& model, const SceneDepth& scene, const Refinem
   for (int k = 0; k < 6; ++k)
     held += eigen.eigenvectors().col(k) * eigen.eigenvectors().col(k).transpose() /
             std::max(least, eigen.eigenvalues()(k) / inflation);
-  const Vec3 at = fit.camera_from_part * model.middle;
+  const Vec3 at = fit.camera_from_bin * model.rim_middle;
   const Mat6 pull = scale.asDiagonal() *
-                    Mat6(pull_of_systematic_errors(model.mesh, scene, fit.camera_from_part, scene.surfels->scan->noise,
+                    Mat6(pull_of_systematic_errors(model.level, scene, fit.camera_from_bin, scene.surfels->scan->noise,
                                                    at, step, 0)) *
                     scale.asDiagonal();
   const double shape = kShapeSigma * model.longest_mm;
@@ -177,9 +235,9 @@ Mat6 covariance_of(const BinModel& model, const SceneDepth& scene, const Refinem
   return scale.asDiagonal() * c * scale.asDiagonal();
 }
 
-/// (motion of the middle, w) -> (of the origin, w).
-Mat6 about_origin(const Mat6& covariance, const Pose& pose, const Vec3& middle) {
-  const Vec3 arm = pose.linear() * -middle;
+/// (motion of the rim's middle, w) -> (of another point, w).
+Mat6 about(const Mat6& covariance, const BinModel& model, const Pose& pose, const Vec3& point) {
+  const Vec3 arm = pose.linear() * (point - model.rim_middle);
   Mat6 j = Mat6::Identity();
   j.topRightCorner<3, 3>() << 0, arm.z(), -arm.y(), -arm.z(), 0, arm.x(), arm.y(), -arm.x(), 0;
   return j * covariance * j.transpose();
@@ -193,8 +251,9 @@ void measure_drift(const KnownBin& known, const BinModel& model, const Mat6& fit
       vector_from_rotation(Matrix3(out.camera_from_bin.linear() * given.linear().transpose()));
   out.drift_mm = d.head<3>().norm();
   out.drift_rad = d.tail<3>().norm();
-  const Mat6 c = fit_covariance + moved_by_camera(at, known.sigma_mm > 0 ? known.sigma_mm : kHandEyeMm,
-                                                  known.sigma_rad > 0 ? known.sigma_rad : kHandEyeRad);
+  const Mat6 c = about(fit_covariance, model, out.camera_from_bin, model.middle) +
+                 moved_by_camera(at, known.sigma_mm > 0 ? known.sigma_mm : kHandEyeMm,
+                                 known.sigma_rad > 0 ? known.sigma_rad : kHandEyeRad);
   out.drift_sigma = std::sqrt(d.dot(c.ldlt().solve(d)));
 }
 
@@ -205,20 +264,22 @@ std::string percent(const char* format, double share, double wanted) {
 }
 
 /// Why a fitted pose is no sight of the bin; empty = it is.
-std::string doubt(const Look& look) {
-  const double sides = look.sides.all();
-  // A quarter of rim and walls: one long side of four. Less could be any edge.
-  constexpr double kLeastSides = 0.15;
-  if (look.sides.supported < kLeastSides * std::max(1.0, sides))
-    return percent("%.0f %% of the rim and walls are seen where they should be, wanted %.0f %%",
-                   look.sides.supported / std::max(1.0, sides), kLeastSides);
+/// \param given  its place was told: then it may be cut by the image's border.
+std::string doubt(const Look& look, bool given) {
+  const double least_in_view = given ? 0.25 : 0.75;  // one side of four; all but a corner or two
+  if (look.rim_in_view < least_in_view)
+    return percent("%.0f %% of its rim would be in the image, wanted %.0f %%", look.rim_in_view, least_in_view);
+  constexpr double kLeastRim = 0.25;  // one side of four: less could be any edge
+  const double rim = look.rim.supported / std::max(1.0, double(look.rim.all()));
+  if (rim < kLeastRim) return percent("%.0f %% of the rim is seen where it should be, wanted %.0f %%", rim, kLeastRim);
   constexpr double kMostViolated = 0.15;
-  for (const Counts* c : {&look.sides, &look.floor}) {
-    const int judged = c->supported + c->violated;
-    if (c->violated > kMostViolated * judged)
-      return (c == &look.floor ? std::string("its floor: ") : std::string("its rim and walls: ")) +
-             percent("the camera sees through %.0f %% of what it can see of them, wanted at most %.0f %%",
-                     double(c->violated) / judged, kMostViolated);
+  const std::pair<const Counts*, const char*> pieces[] = {
+      {&look.rim, "its rim: "}, {&look.walls, "its walls: "}, {&look.floor, "its floor: "}};
+  for (const auto& [counts, name] : pieces) {
+    const int judged = counts->supported + counts->violated;
+    if (counts->violated > kMostViolated * judged)
+      return name + percent("the camera sees through %.0f %% of what it can judge, wanted at most %.0f %%",
+                            double(counts->violated) / judged, kMostViolated);
   }
   // Half of what is seen of the outer edge ends there. Where the image shows none of it, the floor has to be seen.
   constexpr double kLeastBreaks = 0.5;
@@ -227,10 +288,40 @@ std::string doubt(const Look& look) {
     if (look.outline.contour() < kLeastBreaks)
       return percent("at %.0f %% of the rim's outer edge the surface ends, wanted %.0f %%", look.outline.contour(),
                      kLeastBreaks);
-  } else if (look.floor.supported < kLeastSides * look.floor.all()) {
+  } else if (look.floor.supported < kLeastRim * look.floor.all()) {
     return "neither the outer edge of its rim nor its floor is seen";
   }
   return {};
+}
+
+/// A pose fitted on few pixels.
+struct Attempt {
+  Pose pose = Pose::Identity();
+  Look look;
+  bool sure = false;
+};
+
+bool better(const Attempt& a, const Attempt& b) { return a.sure != b.sure ? a.sure : a.look.score() > b.look.score(); }
+
+std::optional<Attempt> best_attempt(const BinModel& model, const SceneDepth& scene, const std::vector<Pose>& starts,
+                                    bool given) {
+  const int step = step_of(scene, 30000);
+  std::vector<Attempt> attempts(starts.size());
+  parallel_each(static_cast<int>(starts.size()), [&](int i) {
+    const Pose pose = fitted(model, scene, starts[i], step, model.start_scale_mm).camera_from_bin;
+    const Look look = look_at(model, scene, pose, step);
+    attempts[i] = {pose, look, doubt(look, given).empty()};
+  });
+  std::optional<Attempt> best;
+  for (const Attempt& attempt : attempts)
+    if (!best || better(attempt, *best)) best = attempt;
+  return best;
+}
+
+/// A bin that does not open towards the camera shows no inside.
+bool opens_to_camera(const BinModel& model, const Pose& pose) {
+  const Eigen::Vector3d to_camera = -(pose * model.middle).normalized();
+  return to_camera.dot(pose.linear().col(2)) > std::cos(60 * kDegree);
 }
 
 }  // namespace
@@ -240,51 +331,40 @@ BinSighting find_bin(const KnownBin& known, const Surfels& surfels, const Primit
   const BinModel model = model_of(known.shape);
   BinSighting out;
   out.shape = known.shape;
-  std::vector<Pose> starts;
-  if (known.camera_from_bin) starts.push_back(*known.camera_from_bin);
-  for (const RimHypothesis& h : seek_rim(known.shape, surfels, observation, known.camera_from_bin))
-    // Farther than half of the shorter side is another bin, or nothing to go by.
-    if (!known.camera_from_bin || (h.camera_from_bin * model.middle - *known.camera_from_bin * model.middle).norm() <
-                                      0.5 * std::min(known.shape.inner_size_mm.x(), known.shape.inner_size_mm.y()))
-      starts.push_back(h.camera_from_bin);
-  // A bin that does not open towards the camera shows no inside.
-  std::erase_if(starts, [&](const Pose& start) {
-    const Eigen::Vector3d to_camera = -(start * model.middle).normalized();
-    return to_camera.dot(start.linear().col(2)) < std::cos(60 * kDegree);
-  });
-  if (starts.empty()) {
+  const int fine = step_of(scene, 100000);
+  const bool given = known.camera_from_bin.has_value();
+  std::optional<Attempt> best;
+  if (given && opens_to_camera(model, *known.camera_from_bin))
+    best = best_attempt(model, scene, {*known.camera_from_bin}, given);
+  // Only a bin that is not where it should be has to be sought.
+  if (!best || !best->sure) {
+    std::vector<Pose> starts;
+    for (const RimHypothesis& h : seek_rim(known.shape, surfels, observation, known.camera_from_bin)) {
+      const Pose& pose = h.camera_from_bin;
+      // Farther than half of the shorter side is another bin, or nothing to go by.
+      const double reach = 0.5 * std::min(known.shape.inner_size_mm.x(), known.shape.inner_size_mm.y());
+      const bool near =
+          !known.camera_from_bin || (pose * model.middle - *known.camera_from_bin * model.middle).norm() < reach;
+      if (near && opens_to_camera(model, pose)) starts.push_back(pose);
+    }
+    const std::optional<Attempt> sought = best_attempt(model, scene, starts, given);
+    if (sought && (!best || better(*sought, *best))) best = sought;
+  }
+  if (!best) {
     out.reason = "no rim of its size stands out in the scan, open towards the camera";
     return out;
   }
-  // A start is as far off as a wall is thick; 1 % of the bin is what its own surfaces may be told by.
-  const double start_scale = std::max(known.shape.wall_mm, 0.01 * model.longest_mm);
-  const double near_mm = 0.01 * model.longest_mm;
-  const int coarse = step_of(scene, 30000), fine = step_of(scene, 300000);
-  std::vector<Pose> fits(starts.size());
-  std::vector<Look> looks(starts.size());
-  parallel_each(static_cast<int>(starts.size()), [&](int i) {
-    fits[i] = fitted(model, scene, starts[i], coarse, start_scale, 12).camera_from_part;
-    looks[i] = look_at(model, scene, fits[i], coarse, near_mm);
-  });
-  std::size_t best = 0;
-  const auto better = [](const Look& a, const Look& b) {
-    const bool sure_a = doubt(a).empty(), sure_b = doubt(b).empty();
-    return sure_a != sure_b ? sure_a : a.score() > b.score();
-  };
-  for (std::size_t i = 1; i < looks.size(); ++i)
-    if (better(looks[i], looks[best])) best = i;
-
-  const Pose turned = nearest_turn(known.shape, fits[best], known.camera_from_bin);
-  const Refinement fit = fitted(model, scene, turned, fine, 0.25 * start_scale, 8);
-  const Look look = look_at(model, scene, fit.camera_from_part, fine, near_mm);
-  out.camera_from_bin = fit.camera_from_part;
-  out.reason = doubt(look);
+  const Pose turned = nearest_turn(known.shape, best->pose, known.camera_from_bin);
+  const BinFit fit = fitted(model, scene, turned, fine, 0.25 * model.start_scale_mm);
+  const Look look = look_at(model, scene, fit.camera_from_bin, fine);
+  out.camera_from_bin = fit.camera_from_bin;
+  out.reason = doubt(look, given);
   out.found = out.reason.empty();
   out.tolerance_mm = 4 * std::max(look.spread_mm, 0.3 * scene.median_sigma_mm);
   const Mat6 covariance = covariance_of(model, scene, fit, fine);
-  out.covariance = about_origin(covariance, out.camera_from_bin, model.middle);
+  out.covariance = about(covariance, model, out.camera_from_bin, Vec3::Zero());
   if (!out.found) return out;
-  if (known.camera_from_bin) measure_drift(known, model, covariance, out);
+  if (given) measure_drift(known, model, covariance, out);
   out.fill = fill_of(out, *surfels.scan);
   return out;
 }

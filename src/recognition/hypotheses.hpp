@@ -72,9 +72,11 @@ std::vector<std::uint32_t> unexplained_surfels(const SceneFeatures& scene, const
 /// What neither a part nor the ground explains. The ground is the bin and what lies around it; without one, what is too
 /// large for any of the parts. Pieces smaller than those that could be one of the parts are left out.
 /// \param explained  cells of the parts that are told.
+/// \param in_bin     cells_inside of the bin; not read without one.
 /// \return largest volume first.
 std::vector<UnexplainedRegion> unexplained_regions(const SceneFeatures& scene, std::span<const Part> parts,
-                                                   const CellMask& explained, const BinSighting* bin);
+                                                   const CellMask& explained, const BinSighting* bin,
+                                                   const Image<std::uint8_t>& in_bin);
 
 /// Rotation that turns frame (x, y) of the part onto that of the camera: camera_from_part with R x_part = x_camera and
 /// the y of both in one half plane.

@@ -273,13 +273,12 @@ std::vector<Polished> choose(const SceneFeatures& features, const SceneDepth& sc
   return winners;
 }
 
-/// The bin itself, and all that lies around it.
-CellMask cells_of_bin(const BinSighting& bin, const Surfels& surfels) {
-  const Image<std::uint8_t> inside = cells_inside(bin, surfels);
+/// The cells that are not flagged.
+CellMask all_but(const Image<std::uint8_t>& flags) {
   CellMask out;
-  out.bits.assign(inside.size() / 64 + 1, 0);
-  for (std::size_t i = 0; i < inside.size(); ++i)
-    if (!inside.data[i]) out.bits[i / 64] |= std::uint64_t{1} << (i % 64), ++out.count;
+  out.bits.assign(flags.size() / 64 + 1, 0);
+  for (std::size_t i = 0; i < flags.size(); ++i)
+    if (!flags.data[i]) out.bits[i / 64] |= std::uint64_t{1} << (i % 64), ++out.count;
   return out;
 }
 
@@ -303,7 +302,11 @@ Instances recognize(const Primitives& primitives, const PrimitiveModel& observat
   SceneDepth scene = make_scene_depth(*surfels.scan, surfels);
   SceneFeatures features = make_scene_features(primitives, observation, surfels);
 
-  if (options.bin != nullptr) claim_cells(features, cells_of_bin(*options.bin, surfels));
+  Image<std::uint8_t> in_bin;
+  if (options.bin != nullptr) {
+    in_bin = cells_inside(*options.bin, surfels);
+    claim_cells(features, all_but(in_bin));
+  }
   WorkBudget budget(options.time_limit_ms, options.work_limit);
   Refused refused;
   Standing stands;
@@ -360,7 +363,7 @@ Instances recognize(const Primitives& primitives, const PrimitiveModel& observat
     for (Instance& instance : *list) instance.id = ++id;
   }
   name_neighbours(parts, out);
-  out.unexplained = unexplained_regions(features, parts, told, options.bin);
+  out.unexplained = unexplained_regions(features, parts, told, options.bin, in_bin);
   return out;
 }
 

@@ -72,7 +72,9 @@ struct Layer {
   std::vector<Vec2> points;
 };
 
-RimHypothesis best_in(const Layer& layer, const BinShape& shape, double rim_points, double from, double to) {
+/// \param every  one point in so many is counted.
+RimHypothesis best_in(const Layer& layer, const BinShape& shape, double rim_points, double from, double to,
+                      std::size_t every) {
   const double wall = shape.wall_mm, bin = wall / 3;
   const double length = shape.inner_size_mm.x() + wall, width = shape.inner_size_mm.y() + wall;
   // Half a step turns the longer side's end by half a wall.
@@ -88,13 +90,14 @@ RimHypothesis best_in(const Layer& layer, const BinShape& shape, double rim_poin
     const double yaw = from + (step + 0.5) * (to - from) / steps, c = std::cos(yaw), s = std::sin(yaw);
     x.assign(bins, 0);
     y.assign(bins, 0);
-    for (const Vec2& p : layer.points) {
+    for (std::size_t i = 0; i < layer.points.size(); i += every) {
+      const Vec2& p = layer.points[i];
       ++x[static_cast<std::size_t>((c * p.x() + s * p.y() - first) / bin)];
       ++y[static_cast<std::size_t>((-s * p.x() + c * p.y() - first) / bin)];
     }
     const StripPair px = best_pair(x, apart_x, first, bin), py = best_pair(y, apart_y, first, bin);
     // Both pairs are wanted; a side that is hidden leaves half of its own.
-    const double score = (px.points + py.points) / rim_points;
+    const double score = static_cast<double>(every) * (px.points + py.points) / rim_points;
     if (score <= best.score) continue;
     best.score = score;
     const Eigen::Vector3d ex = c * layer.a + s * layer.b, ey = -s * layer.a + c * layer.b;
@@ -147,6 +150,7 @@ std::vector<RimHypothesis> seek_rim(const BinShape& shape, const Surfels& surfel
       layers.push_back(std::move(layer));
     }
   }
+  // One point in four: a rim has hundreds of them, and the fit has the last word.
   std::vector<RimHypothesis> found(layers.size());
   constexpr double kTurn = 15 * kDegree;  // of a bin that was put down by hand against its place
   parallel_each(static_cast<int>(layers.size()), [&](int i) {
@@ -154,12 +158,12 @@ std::vector<RimHypothesis> seek_rim(const BinShape& shape, const Surfels& surfel
     const double z = std::abs(layer.height) / std::max(0.2, std::abs(layer.up.z()));
     const double expected = rim_area / (z * spacing * z * spacing);
     if (static_cast<double>(layer.points.size()) < 0.2 * expected) return;
-    found[i] = best_in(layer, shape, expected, near ? -kTurn : 0.0, near ? kTurn : kPi);
+    found[i] = best_in(layer, shape, expected, near ? -kTurn : 0.0, near ? kTurn : kPi, 4);
   });
   std::stable_sort(found.begin(), found.end(),
                    [](const RimHypothesis& x, const RimHypothesis& y) { return x.score > y.score; });
   std::vector<RimHypothesis> out;
-  constexpr std::size_t kFew = 5;
+  constexpr std::size_t kFew = 8;
   for (const RimHypothesis& h : found) {
     if (out.size() >= kFew || h.score < 0.1) break;  // less than a tenth of a rim is chance
     if (std::none_of(out.begin(), out.end(), [&](const RimHypothesis& o) {

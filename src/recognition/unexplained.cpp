@@ -95,7 +95,8 @@ std::vector<std::uint32_t> unexplained_surfels(const SceneFeatures& scene, const
 }
 
 std::vector<UnexplainedRegion> unexplained_regions(const SceneFeatures& scene, std::span<const Part> parts,
-                                                   const CellMask& explained, const BinSighting* bin) {
+                                                   const CellMask& explained, const BinSighting* bin,
+                                                   const Image<std::uint8_t>& in_bin) {
   if (parts.empty()) return {};
   const Surfels& surfels = *scene.surfels;
   const Image<std::int32_t>& grid = surfels.surfel_of_cell;
@@ -105,8 +106,7 @@ std::vector<UnexplainedRegion> unexplained_regions(const SceneFeatures& scene, s
   // In a known bin whatever is off its floor and walls counts; else what is no larger than the parts are.
   Image<std::uint8_t> ground(grid.width, grid.height, 0);
   if (bin != nullptr) {
-    const Image<std::uint8_t> inside = cells_inside(*bin, surfels);
-    for (std::size_t i = 0; i < ground.size(); ++i) ground.data[i] = !inside.data[i];
+    for (std::size_t i = 0; i < ground.size(); ++i) ground.data[i] = !in_bin.data[i];
   } else {
     SceneFeatures unclaimed = scene;
     unclaimed.claimed = {};
