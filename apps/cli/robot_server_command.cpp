@@ -5,11 +5,14 @@
 #include <thread>
 
 #include "camera_source.hpp"
+#include "tribin/config/robot_file.hpp"
 #include "tribin/config/work_cell.hpp"
 #include "tribin/core/error.hpp"
 #include "tribin/core/log.hpp"
 #include "tribin/finder/finder.hpp"
+#include "tribin/grasp/grasp.hpp"
 #include "tribin/io/rig_file.hpp"
+#include "tribin/picking/vision.hpp"
 #include "tribin/robot/cell_limits.hpp"
 #include "tribin/robot/text_protocol.hpp"
 
@@ -30,6 +33,16 @@ struct Options {
 
 constexpr double kApproach_mm = 100;  // before the pick, back along the tool
 constexpr double kLift_mm = 150;      // after it, straight up
+
+/// A planned grasp as the three poses that a robot's program is given. \return none where its way in takes a fourth:
+/// from above into a bin, then aslant
+std::optional<TextPick> planned_pick(const grasp::Grasp& grasp) {
+  if (grasp.at(grasp::Step::entry)) return {};
+  TextPick pick;
+  pick.pick = {grasp.at(grasp::Step::pre_pick)->base_from_tcp, grasp.at(grasp::Step::pick)->base_from_tcp,
+               grasp.at(grasp::Step::retreat)->base_from_tcp};
+  return pick;
+}
 
 /// The best taught pick point of one part in one of its equivalent poses: greatest priority, then least tilt.
 std::optional<TextPick> taught_pick(const CellPart& part, const std::vector<Pose>& base_from_part) {
@@ -58,6 +71,11 @@ class Vision {
     for (const CellPart& part : cell.parts)
       for (Part& read : read_parts({{part.name, part.cad}}, part.unit, options.no_cache))
         parts_.push_back(std::move(read));
+    for (std::size_t i = 0; i < parts_.size() && !cell.grippers.empty(); ++i) {
+      known_.push_back(grasp::prepare_grasps(parts_[i], cell.parts[i], cell.grippers));
+      for (const std::string& warning : known_.back().warnings) log(LogLevel::warning, warning);
+    }
+    if (!cell.robots.empty()) robot_ = read_robot(cell.robots.front().model);
     if (std::filesystem::is_regular_file(options.from.source)) return;  // a scan, read anew each time
     if (!options.calibration.empty()) rig_ = read_rig(options.calibration, options.from.source);
     camera_ = open_source(options.from);
@@ -72,23 +90,48 @@ class Vision {
     scene.status = found.status == "empty"         ? TextStatus::bin_empty
                    : found.instances.items.empty() ? TextStatus::no_object
                                                    : TextStatus::not_pickable;
-    for (const Instance& instance : found.instances.items) {
-      const auto part = std::find_if(cell_.parts.begin(), cell_.parts.end(),
-                                     [&](const CellPart& p) { return p.name == instance.part; });
-      const Pose base_from_scan = base_from_input * scan.input_from_camera;
-      std::vector<Pose> poses{base_from_scan * instance.camera_from_part};
-      for (const Pose& other : instance.equivalent_poses) poses.push_back(base_from_scan * other);
-      if (std::optional<TextPick> pick = taught_pick(*part, poses)) {
-        pick->id = instance.id;
-        pick->part_class = static_cast<int>(part - cell_.parts.begin()) + 1;
-        scene.picks.push_back(*pick);
-        scene.status = TextStatus::scanned;
-      }
-    }
+    const Pose base_from_scan = base_from_input * scan.input_from_camera;
+    if (known_.empty())
+      add_taught(found, base_from_scan, scene);
+    else
+      add_planned(scan, found, base_from_scan, scene);
+    if (!scene.picks.empty()) scene.status = TextStatus::scanned;
     return scene;
   }
 
  private:
+  /// The best grasp of each part, best first. Cells with grippers have them planned, checked against all that is known.
+  void add_planned(const Scan& scan, const Found& found, const Pose& base_from_scan, TextScene& scene) const {
+    grasp::Scene seen = grasp::scene_of(cell_, scan, base_from_scan, found.instances, known_);
+    if (robot_) seen.arm = grasp::ArmHere{&*robot_, &picking::arm_of(cell_, *robot_), 0, {}};
+    for (const grasp::Grasp& grasp : grasp::plan_grasps(seen).grasps) {
+      const bool has_one = std::any_of(scene.picks.begin(), scene.picks.end(),
+                                       [&](const TextPick& pick) { return pick.id == grasp.id; });
+      std::optional<TextPick> pick = planned_pick(grasp);
+      if (has_one || !pick) continue;
+      add(grasp.id, grasp.part_name, *pick, scene);
+    }
+  }
+
+  /// Without a gripper in the cell: the taught points as they are, unchecked.
+  void add_taught(const Found& found, const Pose& base_from_scan, TextScene& scene) const {
+    for (const Instance& instance : found.instances.items) {
+      std::vector<Pose> poses{base_from_scan * instance.camera_from_part};
+      for (const Pose& other : instance.equivalent_poses) poses.push_back(base_from_scan * other);
+      const auto part = std::find_if(cell_.parts.begin(), cell_.parts.end(),
+                                     [&](const CellPart& p) { return p.name == instance.part; });
+      if (const std::optional<TextPick> pick = taught_pick(*part, poses)) add(instance.id, instance.part, *pick, scene);
+    }
+  }
+
+  void add(int id, const std::string& part, TextPick pick, TextScene& scene) const {
+    const auto at =
+        std::find_if(cell_.parts.begin(), cell_.parts.end(), [&](const CellPart& p) { return p.name == part; });
+    pick.id = id;
+    pick.part_class = static_cast<int>(at - cell_.parts.begin()) + 1;
+    scene.picks.push_back(pick);
+  }
+
   Scan take() const {
     if (!camera_) return read_scan_logged(options_.from.source, cell_.camera->file.string(), options_.scan_unit);
     Shot shot = camera_->grab();
@@ -101,6 +144,8 @@ class Vision {
   const Options& options_;
   const WorkCell& cell_;
   std::vector<Part> parts_;
+  std::vector<grasp::GraspPart> known_;  ///< empty where the cell has no gripper
+  std::optional<robot::RobotModel> robot_;
   std::optional<Rig> rig_;
   std::unique_ptr<Camera> camera_;
 };
@@ -121,7 +166,7 @@ int run(const Options& options, const Context&) {
     throw Error(ErrorCode::bad_input,
                 options.cell + ": saw no safety.workspace_mm, wanted the box in which poses may be given out");
   for (const CellPart& part : cell.parts)
-    if (part.pick_points.empty())
+    if (part.pick_points.empty() && cell.grippers.empty())
       log(LogLevel::warning, "part " + part.name + " has no pick_points: it is found, and never given out");
   const Vision vision(options, cell);
   robot::TextVision callbacks;

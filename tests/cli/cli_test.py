@@ -328,6 +328,16 @@ model = "{ROOT.resolve()}/examples/robots/gp110.toml"
             self.assertEqual(len(grasp["path"][0]["joints_deg"]), 6)
             self.assertEqual([p["step"] for p in grasp["path"]][-3:], ["pre_pick", "pick", "retreat"])
         self.assertEqual(sum(r["count"] for r in plan["reasons"]), len(plan["refused"]))
+        # A robot's own program is given the best of them.
+        with cell.open("a") as file:
+            file.write("[safety]\nworkspace_mm = {min = [-5000, -5000, -5000], max = [5000, 5000, 5000]}\n")
+        with Served("robot-server", self.scene / "depth/000000.png", "--workcell", cell, "--port", 0, "--any-age") as served:
+            answer = served.talk("HELLO,1,yaskawa\r\nSCAN\r\nGET,3\r\nBYE\r\n", "202\r\n")
+        lines = answer.split("\r\n")
+        self.assertEqual(lines[1:3], ["201,1,1", "200,1,3,0"], answer)
+        for line, point in zip(lines[3:6], plan["grasps"][0]["path"]):
+            for seen, wanted in zip(line.split(",")[4:7], point["base_from_tcp"]["translation_mm"]):
+                self.assertAlmostEqual(float(seen), wanted, delta=0.002)
 
     def test_a_kept_part_is_found_as_one_that_is_compiled_now(self):
         kept, compiled = run(*self.arguments, "--json", "-"), run(*self.arguments, "--json", "-", "--no-cache")
