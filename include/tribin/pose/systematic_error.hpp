@@ -19,8 +19,8 @@ namespace tribin {
 Matrix6 pull_of_systematic_errors(const RenderMesh& mesh, const SceneDepth& scene, const Pose& camera_from_part,
                                   const NoiseProfile& noise, const Vec3& center, int step_px, double cad_sigma_mm);
 
-/// How the pixels of whole patches pull at a pose that is at rest: the sum over some 25 patches of g g^T, where g is the
-/// sum of J^T r / sigma^2 over a patch. For independent noise it is the information of the surface itself; mirrored
+/// How the pixels of whole patches pull at a pose that is at rest: the sum over some 25 patches of g g^T, where g is
+/// the sum of J^T r / sigma^2 over a patch. For independent noise it is the information of the surface itself; mirrored
 /// light, burrs and the sensor's ripple, which no number of pixels averages away, make it more.
 /// \param center  in the camera frame; rotations turn about it, as in Refinement::information.
 /// \return 0 where there are fewer than 12 patches.
