@@ -139,6 +139,7 @@ Phase Run::scan() {
   report_.find_ms = sight_.find_ms;
   report_.seen = sight_.seen;
   std::erase_if(failed_, [&](const Failed& failed) { return scene_ - failed.scene > kScansRemembered; });
+  if (!sight_.suspect.empty()) return finish("calibration_suspect", sight_.suspect);
   if (sight_.status == "empty") return finish("empty", "the bin is empty");
   if (sight_.status == "no_data") return finish("no_data", "the scan holds no measurement in the bin");
   return Phase::choose;
@@ -329,7 +330,8 @@ CycleReport plan_first(const WorkCell& cell, const robot::RobotModel& robot, Vis
   report.find_ms = sight.find_ms;
   report.note = sight.status;
   report.scene = 1;
-  if (sight.status == "empty" || sight.status == "no_data") return report;
+  if (!sight.suspect.empty()) report.note = "calibration_suspect: " + sight.suspect;
+  if (!sight.suspect.empty() || sight.status == "empty" || sight.status == "no_data") return report;
   for (const Resort resort : {Resort::none, Resort::next_gripper, Resort::full_tilt}) {
     const Stopwatch watch;
     const grasp::Plan plan = vision.plan(chooser.plan_options(resort, {}), chooser.places(filling));

@@ -34,7 +34,10 @@ class CameraVision : public Vision {
     sight.status = found_->status;
     for (const grasp::PartHere& part : scene_.parts) sight.seen[part.part->part->name] += part.pick;
     sight.find_ms = found_->times.total();
-    for (const Warning& warning : found_->warnings) sight.warnings.push_back(warning.text);
+    for (const Warning& warning : found_->warnings) {
+      sight.warnings.push_back(warning.text);
+      if (warning.code == "calibration_drift") sight.suspect = warning.text;
+    }
     return sight;
   }
 

@@ -98,15 +98,25 @@ double straightest(const Contact& a, const Contact& b) {
   return best;
 }
 
-/// Two outer jaws press a part until it can turn no further: the nearest least width over turns about the tool and
-/// about the jaws' height.
-Pose aligned(const grasp::GripperShape& gripper, double opening_mm, const Solid::State& part, Pose tcp_from_part) {
-  constexpr double kSteps[] = {2 * kDegree, 0.5 * kDegree, 0.1 * kDegree};
-  constexpr int kMostSteps = 8;      // of each size: beyond 20 deg it is another grasp
+/// Friction holds the part as it lies between two jaws.
+bool is_steady(const Closed& closed, double cone) {
+  for (const Contact& contact : closed.contacts)
+    if (contact.across < cone) return false;
+  return straightest(closed.contacts[0], closed.contacts[1]) >= cone;
+}
+
+/// Two outer jaws press a part that friction does not hold, and it turns about the tool and about the jaws' height as
+/// that lets them close, until friction holds it or it can turn no further.
+Pose aligned(const grasp::GripperShape& gripper, double opening_mm, const Solid::State& part, Pose tcp_from_part,
+             double cone) {
+  constexpr double kSteps[] = {0.5 * kDegree, 0.1 * kDegree};
+  constexpr int kMostSteps = 40;     // of each size: beyond 20 deg it is another grasp
   constexpr double kGain_mm = 0.02;  // less is the spacing of the points
-  double width = close_on(gripper, opening_mm, part, tcp_from_part).mean;
+  Closed before = close_on(gripper, opening_mm, part, tcp_from_part);
+  double width = before.mean;
   for (const double step : kSteps)
     for (int i = 0; i < kMostSteps; ++i) {
+      if (is_steady(before, cone)) return tcp_from_part;
       std::optional<Pose> better;
       for (const Vec3& axis : {Vec3(Vec3::UnitZ()), Vec3(Vec3::UnitY())})
         for (const double sign : {-1.0, 1.0}) {
@@ -116,6 +126,7 @@ Pose aligned(const grasp::GripperShape& gripper, double opening_mm, const Solid:
           const Closed now = close_on(gripper, opening_mm, part, turned);
           if (!now.all || now.mean > width - kGain_mm) continue;
           width = now.mean;
+          before = now;
           better = turned;
         }
       if (!better) break;
@@ -136,9 +147,10 @@ Grip close_jaws(const grasp::GripperShape& gripper, double opening_mm, const Sol
   if (!closed.all) return refuse("a jaw meets nothing");
   for (const Contact& contact : closed.contacts)
     if (contact.through) return refuse("the part is wider than the jaws stand open");
+  const double cone = std::cos(std::atan(friction));
   Pose seated = tcp_from_part;
   if (gripper.jaws == 2 && !gripper.inside) {
-    seated = aligned(gripper, opening_mm, part, tcp_from_part);
+    seated = aligned(gripper, opening_mm, part, tcp_from_part, cone);
     closed = close_on(gripper, opening_mm, part, seated);
   }
   // Jaws move by the same way: the part is shifted until it is as far from the axis at each.
@@ -151,7 +163,6 @@ Grip close_jaws(const grasp::GripperShape& gripper, double opening_mm, const Sol
   if (gripper.inside && grip.opening_mm < opening_mm) return refuse("the hole is narrower than the jaws");
   if (grip.opening_mm < gripper.stroke_min() || grip.opening_mm > gripper.stroke_max())
     return refuse("the part's width is outside of the stroke");
-  const double cone = std::cos(std::atan(friction));
   for (const Contact& contact : closed.contacts)
     if (contact.across < cone) return refuse("the surface slants: it slips out of the jaws");
   if (gripper.jaws == 2 && straightest(closed.contacts[0], closed.contacts[1]) < cone)

@@ -211,6 +211,16 @@ TEST(Cycle, AnOrderThatWasNeverTakenIsForgotten) {
   bench.expect_truth_is_as_told();
 }
 
+TEST(Cycle, NothingMovesByACalibrationThatIsSuspect) {
+  Bench bench(3);
+  bench.vision.suspect = "the bin is 9 mm from its place";
+  const RunEnd end = bench.run();
+  EXPECT_EQ(end.status, "calibration_suspect");
+  EXPECT_EQ(end.message, bench.vision.suspect);
+  EXPECT_EQ(bench.truth.grips, 0);
+  EXPECT_TRUE(bench.machine.moves().empty());
+}
+
 TEST(Cycle, ADryRunMovesNothing) {
   Bench bench(3);
   const CycleReport report = plan_first(bench.cell, bench.robot, bench.vision, Filling(6), bench.limits);

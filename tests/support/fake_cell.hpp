@@ -160,6 +160,7 @@ class FakeVision : public picking::Vision {
     for (std::size_t i = 0; i < seen_.size(); ++i)
       if (seen_[i]) ++sight.seen[kind_of(static_cast<int>(i))];
     sight.status = sight.seen.empty() ? "empty" : "ok";
+    sight.suspect = suspect;
     return sight;
   }
 
@@ -208,6 +209,7 @@ class FakeVision : public picking::Vision {
   int scans = 0, pushes = 0, pushes_to_free = 1;
   std::map<int, bool> hard;  ///< parts that only full tilt takes
   std::vector<int> buried;   ///< parts that a push frees
+  std::string suspect;       ///< of the calibration
   std::vector<grasp::PlanOptions> asked;
 
  private:

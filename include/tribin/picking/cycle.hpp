@@ -49,7 +49,8 @@ struct CycleReport {
 
 /// How a run ended.
 struct RunEnd {
-  std::string status;   ///< rack_full, empty, not_empty_no_object, not_pickable, no_data, in_doubt, most_parts
+  std::string status;   ///< rack_full, empty, not_empty_no_object, not_pickable, part_missing, no_data,
+                        ///< calibration_suspect, in_doubt, most_parts, recovered
   std::string message;  ///< one sentence for people
   int placed = 0;       ///< in this run
 };

@@ -23,6 +23,7 @@ struct Sight {
   std::map<std::string, int> seen;  ///< parts of each class whose pose is sure
   double find_ms = 0;               ///< normals to poses, of this machine
   double age_s = 0;                 ///< of the scan, when it was taken in
+  std::string suspect;  ///< why the calibration is not to be trusted: the bin is not where it should be; empty = it is
   std::vector<std::string> warnings;
 };
 
