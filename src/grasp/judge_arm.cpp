@@ -23,10 +23,12 @@ Checked check_arm(const SceneFacts& facts, Attempt& a) {
   if (!a.arm_path) return {};
   const ArmHere& arm = *facts.scene->arm;
   const double clearance = facts.options->clearance_mm;
-  std::vector<Convex> before, start;
+  std::vector<Convex> before;
   for (const robot::Joints& joints : a.arm_path->along) {
-    const std::vector<Convex> links = arm_bodies(*arm.robot, *arm.arm, arm.waist, joints);
-    if (before.empty()) before = start = links;
+    std::vector<Convex> links = arm_bodies(*arm.robot, *arm.arm, arm.waist, joints);
+    const Pose base_from_flange = base_from_arm(*arm.robot, *arm.arm, arm.waist) * arm_from_flange(*arm.arm, joints);
+    for (const Convex& carried : facts.scene->on_flange) links.push_back(moved(base_from_flange, carried));
+    if (before.empty()) before = links;
     for (std::size_t k = 0; k < links.size(); ++k) {
       // What does not move stands where it was put. Between two places a link is half their distance from one of them.
       const double step = moves_by(before[k], links[k]);

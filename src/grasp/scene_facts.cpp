@@ -89,7 +89,10 @@ double covered_share(const SceneFacts& facts, std::size_t part, const std::vecto
   }
   for (const Vec3& p : unknown) {
     const int u = static_cast<int>(std::lround(p.x() / kCell_mm)), v = static_cast<int>(std::lround(p.y() / kCell_mm));
-    if (own.covers(u, v) && p.z() > own.high[own.index(u, v)] + kAbove_mm) covered[own.index(u, v)] = 1;
+    // At the outline depths are mixed with those behind it: that is no thing on the part.
+    const bool within = own.covers(u, v) && own.covers(u - 1, v) && own.covers(u + 1, v) && own.covers(u, v - 1) &&
+                        own.covers(u, v + 1);
+    if (within && p.z() > own.high[own.index(u, v)] + kAbove_mm) covered[own.index(u, v)] = 1;
   }
   int count = 0;
   for (std::size_t i = 0; i < covered.size(); ++i) {

@@ -46,9 +46,11 @@ Scene scene_of(const WorkCell& cell, const Scan& scan, const Pose& base_from_cam
     pose.translation() = 0.5 * (range.min + range.max);
     scene.obstacles.push_back(make_box(pose, range.max - range.min));
   }
-  if (cell.camera && cell.camera->keep_out_mm > 0 && cell.mount() == CameraMount::fixed)
-    scene.obstacles.push_back(
-        make_capsule(base_from_camera.translation(), base_from_camera.translation(), cell.camera->keep_out_mm));
+  if (cell.camera && cell.camera->keep_out_mm > 0) {
+    const bool fixed = cell.mount() == CameraMount::fixed;
+    const Vec3 at = (fixed ? base_from_camera : cell.hand_eye.parent_from_camera).translation();
+    (fixed ? scene.obstacles : scene.on_flange).push_back(make_capsule(at, at, cell.camera->keep_out_mm));
+  }
   add_parts(scene, found.items, true, known);
   add_parts(scene, found.uncertain, false, known);
   return scene;

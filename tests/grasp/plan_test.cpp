@@ -435,6 +435,16 @@ TEST(PlanGraspsRefuses, ArmScan) {
   expect_refused(plan_grasps(scene), Why::arm_scan);
 }
 
+TEST(PlanGraspsRefuses, WhatTheFlangeCarries) {
+  robot::RobotModel robot = gp110_beside();
+  robot.arms[0].capsules = {{1, Vec3::Zero(), Vec3::Zero(), 10}};
+  Scene scene = one_rod();
+  scene.arm = arm_for(robot);
+  EXPECT_FALSE(plan_grasps(scene).grasps.empty());
+  scene.on_flange = {make_capsule(Vec3(0, 0, 20), Vec3(0, 0, 20), 190)};  // a camera as wide as the bin
+  expect_refused(plan_grasps(scene), Why::arm_bin);
+}
+
 TEST(PlanGraspsRefuses, ArmObstacle) {
   robot::RobotModel robot = gp110_beside();
   Scene scene = one_rod();

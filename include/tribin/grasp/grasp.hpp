@@ -45,13 +45,13 @@ struct Scene {
   std::vector<PartHere> parts;
   std::optional<ArmHere> arm;          ///< none: reach and links are not checked
   std::vector<Convex> obstacles;       ///< what stands in the cell: rack, camera, the other arm
+  std::vector<Convex> on_flange;       ///< flange's frame: what the arm carries beside the gripper (a camera, a cable)
   std::optional<CellRange> workspace;  ///< where the TCP may be; none = anywhere
 };
 
-/// The scene of a cell: sigmas, bin, workspace, forbidden boxes and the camera's ball as obstacles, found parts with
-/// their covariance along the base's axes. Uncertain parts are obstacles. Parts without an entry in `known` are left
-/// out.
-/// \param known  may be in any order; must outlive the scene, as must the scan.
+/// The scene of a cell: sigmas, bin, workspace, forbidden boxes and a fixed camera's ball as obstacles, found parts
+/// with their covariance along the base's axes. Uncertain parts are obstacles. Parts without an entry in `known` are
+/// left out. \param known  may be in any order; must outlive the scene, as must the scan.
 Scene scene_of(const WorkCell& cell, const Scan& scan, const Pose& base_from_camera, const Instances& found,
                std::span<const GraspPart> known);
 
