@@ -55,7 +55,9 @@ int run(const Options& options, const Context&) {
     known.push_back(grasp::prepare_grasps(parts[i], cell.parts[i], cell.grippers));
     warnings.insert(warnings.end(), known.back().warnings.begin(), known.back().warnings.end());
   }
-  const Found found = find_parts(scan, parts);
+  FinderOptions finder;
+  if (cell.bin) finder.bin = known_bin(cell, scan);
+  const Found found = find_parts(scan, parts, finder);
   const Pose base_from_scan = base_from_camera(cell, scan.taken, options.scan) * scan.input_from_camera;
   grasp::Scene scene = grasp::scene_of(cell, scan, base_from_scan, found.instances, known);
   robot::RobotModel robot;

@@ -85,7 +85,9 @@ class Vision {
     const Scan scan = take();
     const std::optional<std::int64_t> now = options_.any_age ? std::nullopt : std::optional(now_ms());
     const Pose base_from_input = base_from_camera(cell_, scan.taken, options_.from.source, now);
-    const Found found = find_parts(scan, parts_);
+    FinderOptions finder;
+    if (cell_.bin) finder.bin = known_bin(cell_, scan);
+    const Found found = find_parts(scan, parts_, finder);
     TextScene scene;
     scene.status = found.status == "empty"         ? TextStatus::bin_empty
                    : found.instances.items.empty() ? TextStatus::no_object

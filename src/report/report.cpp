@@ -86,10 +86,11 @@ void write_locate_report(const std::filesystem::path& dir, const Scan& scan, std
 
   std::vector<TocEntry> contents = {
       {"poses", "Poses"}, {"pictures", "Ten pictures"}, {"evidence", "Evidence"}, {"why", "Why not?"}};
-  std::string body = report::warning_lines(found.warnings, scan.warnings) +
-                     report::poses_section(scan, parts, found, truth) +
-                     report::overview(seen, parts, found.instances.items) + pictures +
-                     report::evidence_section(parts, found) + report::why_not_section(parts, found);
+  std::string body =
+      report::warning_lines(found.warnings, scan.warnings) + report::poses_section(scan, parts, found, truth) +
+      report::overview(seen, parts, found.instances.items) + pictures + report::evidence_section(parts, found) +
+      report::why_not_section(parts, found) + report::bin_section(scan, found);
+  if (found.bin || !found.instances.unexplained.empty()) contents.push_back({"bin", "Bin and the rest"});
   if (context.times) {
     contents.push_back({"time", "Time"});
     body += report::time_section(found.times, context.threads);

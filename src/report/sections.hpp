@@ -13,6 +13,8 @@ std::string poses_section(const Scan& scan, std::span<const Part> parts, const F
                           const std::optional<ReportTruth>& truth);
 std::string evidence_section(std::span<const Part> parts, const Found& found);
 std::string why_not_section(std::span<const Part> parts, const Found& found);
+/// Where the bin stands, how full it is, and what is left unexplained; empty where there is nothing to tell.
+std::string bin_section(const Scan& scan, const Found& found);
 /// Milliseconds a stage beside the paper's table I, on a logarithmic scale.
 std::string time_section(const StageTimes& times, int threads);
 std::string again_section(const ReportContext& context);
