@@ -4,6 +4,7 @@
 
 #include "support/near_symmetric.hpp"
 #include "support/posed_scan.hpp"
+#include "tribin/config/work_cell.hpp"
 #include "tribin/finder/finder.hpp"
 
 namespace tribin {
@@ -176,6 +177,53 @@ TEST_F(FindPartsInBin, TheSameWorkGivesTheSameAnswer) {
     EXPECT_GE(some.instances.items.size(), before);
     before = some.instances.items.size();
   }
+}
+
+TEST_F(FindPartsInBin, AReplayOfATimedRunEndsAsIt) {
+  const Mesh& part = parts()[0].mesh;
+  const Pose truth = bin_pose(4);
+  const Scan scan = scan_of_bin(truth, {{&part, at(-70, 30, 0)}, {&part, at(60, -20, 0)}}, 4);
+  for (const int limit_ms : {1, 150, 100000}) {
+    SCOPED_TRACE(limit_ms);
+    FinderOptions timed;
+    timed.time_limit_ms = limit_ms;
+    const Found first = look(scan, truth, timed);
+    FinderOptions counted;
+    // A run without any work cannot be asked for: 0 is no limit.
+    if (first.instances.work_done == 0) {
+      EXPECT_EQ(first.status, "time_limit");
+      EXPECT_TRUE(first.instances.items.empty());
+      continue;
+    }
+    counted.work_limit = first.instances.work_done;
+    const Found again = look(scan, truth, counted);
+    EXPECT_EQ(again.status, first.status);
+    ASSERT_EQ(again.instances.items.size(), first.instances.items.size());
+    for (std::size_t i = 0; i < again.instances.items.size(); ++i)
+      EXPECT_TRUE(again.instances.items[i].camera_from_part.matrix() ==
+                  first.instances.items[i].camera_from_part.matrix());
+  }
+}
+
+TEST(KnownBinOfACell, IsWhereTheCameraSeesItWhateverTheFilesFrame) {
+  const Pose base_from_camera = test::random_pose(900.0, 5u), input_from_camera = test::random_pose(300.0, 6u);
+  WorkCell cell;
+  cell.bin = CellBin{};
+  cell.bin->inner_size_mm = kShape.inner_size_mm;
+  cell.bin->base_from_bin = test::random_pose(100.0, 7u);
+  cell.hand_eye = {base_from_camera * input_from_camera.inverse(), 0.4, 0.001};  // of the file's frame
+  Scan scan;
+  scan.input_from_camera = input_from_camera;
+  const KnownBin known = known_bin(cell, scan);
+  ASSERT_TRUE(known.camera_from_bin.has_value());
+  EXPECT_TRUE(known.camera_from_bin->isApprox(base_from_camera.inverse() * cell.bin->base_from_bin, 1e-9));
+  EXPECT_EQ(known.sigma_mm, 0.4);
+  EXPECT_EQ(known.sigma_rad, 0.001);
+  // Neither a place nor a camera's: it is sought.
+  cell.hand_eye = {};
+  cell.bin->base_from_bin = Pose::Identity();
+  scan.input_from_camera = Pose::Identity();
+  EXPECT_FALSE(known_bin(cell, scan).camera_from_bin.has_value());
 }
 
 }  // namespace
