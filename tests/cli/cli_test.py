@@ -95,6 +95,42 @@ class Options(unittest.TestCase):
             self.assertEqual(out.stdout, "")
 
 
+class Bin(unittest.TestCase):
+    def test_an_empty_bin_is_found_and_empty_wherever_it_is_said_to_stand(self):
+        box = box_stl(WORK / "box.stl")
+        made = run("simulate", "--part", box, "--kind", "empty", "--seed", 3, "-o", WORK / "empty_bin", "-q")
+        if made.returncode == 2:
+            self.skipTest("tribin is built without the simulator")
+        self.assertEqual(made.returncode, 0, made.stderr)
+        scene = WORK / "empty_bin/test/000001"
+        info = json.loads((WORK / "empty_bin/scene_info.json").read_text())["1"]
+        bin_file = WORK / "bin.toml"
+        size = "[bin]\ninner_size_mm = %s\nwall_mm = %s\n" % (info["bin_inner_mm"], info["wall_mm"])
+        arguments = ["locate", scene / "depth/000000.png", "--camera", scene / "scene_camera.json", "--part", box,
+                     "--bin", bin_file, "--json", "-"]
+        bin_file.write_text(size)
+        out = run(*arguments)
+        self.assertEqual(out.returncode, 1, out.stderr)
+        sought = validated(self, "locate", out.stdout)
+        self.assertEqual((sought["status"], sought["unexplained"]), ("empty", []))
+        self.assertTrue(sought["bin"]["found"])
+        self.assertNotIn("drift_sigma", sought["bin"])
+        # Said to stand 10 mm beside where it does: the alarm, and the same place.
+        x, y, z = sought["bin"]["camera_from_bin"]["translation_mm"]
+        bin_file.write_text(size + "base_from_bin = {translation_mm = [%f, %f, %f], rotation_deg = "
+                            "{convention = 'yaskawa', values = [180, 0, 0]}}\n" % (x + 10, y, z))
+        out = run(*arguments, "--report", WORK / "bin_report")
+        given = validated(self, "locate", out.stdout)
+        self.assertIn("calibration_drift", [warning["code"] for warning in given["warnings"]])
+        for a, b in zip(given["bin"]["camera_from_bin"]["translation_mm"], (x, y, z)):
+            self.assertAlmostEqual(a, b, delta=0.5)
+        self.assertIn("Bin and the rest", (WORK / "bin_report/index.html").read_text())
+        bin_file.write_text("[bin]\ninner_size_mm = [460, 360]\n")
+        out = run(*arguments)
+        self.assertEqual(out.returncode, 3, out.stderr)
+        self.assertIn("inner_size_mm", out.stderr)
+
+
 class Served:
     """A command that serves until it is told to end; its port is in its first line."""
 
