@@ -32,24 +32,29 @@ inline Beside beside_pixel(const SceneDepth& scene, int u, int v, float z_out, c
   return r < 0 ? Beside::ends : Beside::hidden;
 }
 
-/// Looks outwards from pixel (u, v) in steps of (du, dv), `first` to `last` of them. Next to the outline the surface
-/// may go on; across a gap of the measurement it proves nothing any more, but what is seen there tells whose edge the
-/// gap lies at: the part's own, or that of something in front which shades it.
+/// Looks outwards from pixel (u, v) in steps of (du, dv), `first` to `last` of them. The surface goes on where it is
+/// still there after `near` steps: sensors that smooth their depth draw it out beyond its edge by some pixels. Across a
+/// gap of the measurement it proves nothing any more, but what is seen there tells whose edge the gap lies at: the
+/// part's own, or that of something in front which shades it.
 template <typename Step>
 Beside look_beside(const SceneDepth& scene, double u, double v, Step du, Step dv, int first, int near, int last,
                    const OutlineFacet& facet, double tolerance_mm) {
-  for (int far = first; far <= last; ++far) {
+  bool on = false;  // the surface was seen beside
+  for (int far = first; far <= last && !(on && far > near); ++far) {
     const int x = static_cast<int>(std::floor(u + far * du + 0.5)),
               y = static_cast<int>(std::floor(v + far * dv + 0.5));
-    if (!scene.z_mm.contains(x, y))
-      return far <= near ? Beside::hidden : Beside::ends;  // the image's border is no edge
+    if (!scene.z_mm.contains(x, y)) {  // the image's border is no edge
+      if (far <= near && !on) return Beside::hidden;
+      break;
+    }
     const float z_out = scene.z_mm(x, y);
     if (!(z_out > 0)) continue;
     const Beside seen = beside_pixel(scene, x, y, z_out, facet, tolerance_mm);
-    if (seen == Beside::goes_on && far > near) return Beside::hidden;
-    return seen;
+    if (seen != Beside::goes_on) return seen;
+    if (far > near) return Beside::hidden;
+    on = true;
   }
-  return Beside::ends;  // nothing is measured there: a surface like the part's own would be
+  return on ? Beside::goes_on : Beside::ends;  // nothing measured there: a surface like the part's own would be
 }
 
 }  // namespace tribin
