@@ -63,14 +63,18 @@ BinModel model_of(const BinShape& shape) {
 struct Counts {
   int supported = 0, violated = 0, hidden = 0, unmeasured = 0;
   int all() const { return supported + violated + hidden + unmeasured; }
+  void add(const Counts& o) {
+    supported += o.supported, violated += o.violated, hidden += o.hidden, unmeasured += o.unmeasured;
+  }
 };
 
 /// Floor apart from the rim: any level surface supports the floor.
 struct Look {
   Counts floor, walls, rim;
-  double rim_in_view = 0;  ///< share of the rim that lies in the image
-  double spread_mm = 0;    ///< robust sd of what lies near the model, along its normals
-  Verification outline;    ///< of the outer edge of the rim: a level surface beyond it is no bin
+  std::array<Counts, 4> rim_sides;  ///< the rim side by side
+  double rim_in_view = 0;           ///< share of the rim that lies in the image
+  double spread_mm = 0;             ///< robust sd of what lies near the model, along its normals
+  Verification outline;             ///< of the outer edge of the rim: a level surface beyond it is no bin
 
   double score() const {
     const int violated = floor.violated + walls.violated + rim.violated;
@@ -106,7 +110,9 @@ Look look_at(const BinModel& model, const SceneDepth& scene, const Pose& pose, i
       const std::int32_t k = render.triangle[render.index(i, j)];
       if (k < 0) continue;
       if (k >= kRimEnd) continue;
-      Counts& counts = k < kFloorEnd ? out.floor : k < kWallsEnd ? out.walls : out.rim;
+      Counts& counts = k < kFloorEnd   ? out.floor
+                       : k < kWallsEnd ? out.walls
+                                       : out.rim_sides[static_cast<std::size_t>(k - kWallsEnd) / 2];
       const int u = render.u0 + i * step, v = render.v0 + j * step;
       const double z = scene.z_mm(u, v), z_model = 1.0 / render.inverse_z[render.index(i, j)];
       if (!(z > 0)) {
@@ -125,6 +131,7 @@ Look look_at(const BinModel& model, const SceneDepth& scene, const Pose& pose, i
         ++counts.violated;
       }
     }
+  for (const Counts& side : out.rim_sides) out.rim.add(side);
   if (!residuals.empty()) {
     std::nth_element(residuals.begin(), residuals.begin() + residuals.size() / 2, residuals.end());
     out.spread_mm = 1.4826 * residuals[residuals.size() / 2];
@@ -281,6 +288,12 @@ std::string doubt(const Look& look, bool given) {
       return name + percent("the camera sees through %.0f %% of what it can judge, wanted at most %.0f %%",
                             double(counts->violated) / judged, kMostViolated);
   }
+  // Three sides of a bin of another size fit as well.
+  constexpr double kMostOfSide = 0.4;
+  for (const Counts& side : look.rim_sides)
+    if (side.violated > kMostOfSide * (side.supported + side.violated))
+      return percent("one side of its rim: the camera sees through %.0f %% of it, wanted at most %.0f %%",
+                     double(side.violated) / (side.supported + side.violated), kMostOfSide);
   // Half of what is seen of the outer edge ends there. Where the image shows none of it, the floor has to be seen.
   constexpr double kLeastBreaks = 0.5;
   constexpr int kFewestSamples = 20;
