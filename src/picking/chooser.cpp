@@ -152,6 +152,8 @@ std::optional<Placing> Chooser::place(const Entry& held, const Filling& filling,
   const auto has_ways = [&](const Placing& p) {
     if (!way(start, p.stops[0].base_from_tcp, held.gripper)) return false;
     if (!cell_.bin) return true;
+    if (!arm_is_clear(arm_with(held.gripper), p.stops[0], std::span(p.stops).subspan(1), bodies_of(*cell_.bin)))
+      return false;
     const Start after{p.stops[2].base_from_tcp * flange_from_tcp.inverse(), p.stops[2].joints};
     return way(after, over_bin(), held.gripper).has_value();
   };

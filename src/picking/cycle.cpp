@@ -1,47 +1,16 @@
 #include "tribin/picking/cycle.hpp"
 
 #include <algorithm>
-#include <chrono>
 
 #include "picking/run.hpp"
 #include "tribin/core/error.hpp"
+#include "tribin/core/stage_times.hpp"
 
 namespace tribin::picking {
 namespace {
 
-constexpr int kScansRemembered = 3;       // a grasp that failed is not tried again in so many
-constexpr int kMostPushes = 5;            // in a row, without a pick
-constexpr int kMostFailures = 10;         // grips in a row that held nothing: something else is wrong
-constexpr int kMostTurns = 3;             // at the station, of one part
-constexpr double kTurned = 45 * kDegree;  // a part that is put back as it stood gains nothing
-constexpr int kPushClass = 255;           // B002 of a push, for jobs that close the jaws then
-constexpr double kClosed_mm = 0.1;        // an opening that is said, and closed
-
+constexpr int kScansRemembered = 3;  // a grasp that failed is not tried again in so many
 constexpr double kSamePart_mm = 20;  // a part that was missed lies that near to where it was
-constexpr Chooser::Where kAll[] = {Chooser::Where::slots, Chooser::Where::station, Chooser::Where::turned};
-
-class Stopwatch {
- public:
-  double ms() const {
-    return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin_).count();
-  }
-
- private:
-  std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
-};
-
-std::string joined(const std::vector<std::string>& texts) {
-  std::string out;
-  for (const std::string& text : texts) out += (out.empty() ? "" : "; ") + text;
-  return out;
-}
-
-std::string counted(const std::vector<grasp::WhyCount>& reasons) {
-  std::string out;
-  for (std::size_t i = 0; i < std::min<std::size_t>(3, reasons.size()); ++i)
-    out += (i ? ", " : "") + std::string(name_of(reasons[i].why)) + " " + std::to_string(reasons[i].count);
-  return out.empty() ? "no grasp was found" : "refused: " + out;
-}
 
 }  // namespace
 
@@ -53,6 +22,20 @@ std::string_view name_of(Phase phase) {
 std::string_view name_of(Resort resort) {
   constexpr std::string_view kNames[] = {"none", "next_gripper", "full_tilt", "push"};
   return kNames[static_cast<int>(resort)];
+}
+
+std::string text_of(const std::vector<std::string>& texts) {
+  std::string out;
+  for (const std::string& text : texts) out += (out.empty() ? "" : "; ") + text;
+  return out;
+}
+
+std::string text_of(const std::vector<grasp::WhyCount>& reasons) {
+  constexpr std::size_t kMost = 3;  // a sentence for people; the lines have them all
+  std::string out;
+  for (std::size_t i = 0; i < std::min(kMost, reasons.size()); ++i)
+    out += (i ? ", " : "") + std::string(name_of(reasons[i].why)) + " " + std::to_string(reasons[i].count);
+  return out.empty() ? "no grasp was found" : "refused: " + out;
 }
 
 Run::Run(const RunLinks& links, const RunOptions& options)
@@ -100,7 +83,7 @@ RunEnd Run::go() {
 
 std::vector<Chooser::Where> Run::wheres() const {
   if (!chooser_.has_station() || now().at_station) return {Chooser::Where::slots};
-  return {std::begin(kAll), std::end(kAll)};
+  return {std::begin(kAllPlaces), std::end(kAllPlaces)};
 }
 
 std::vector<Chooser::Avoid> Run::to_avoid() const {
@@ -146,14 +129,16 @@ Phase Run::scan() {
 }
 
 Phase Run::choose() {
-  const Stopwatch watch;
   std::vector<grasp::FailedPick> failed;
   for (const Failed& f : failed_) failed.push_back(f.pick);
   const Places places = chooser_.places(now().filling);
+  StageTimes times;
+  auto watch = std::make_optional<StageTimer>(times, "plan");
   const grasp::Plan plan = links_.vision->plan(chooser_.plan_options(resort_, failed), places);
   std::vector<std::string> why;
   choice_ = chooser_.choose(plan, now().filling, here(), wheres(), to_avoid(), why);
-  report_.plan_ms += watch.ms();
+  watch.reset();
+  report_.plan_ms += times.total();
   report_.refused = plan.reasons;
   report_.resort = resort_;
   if (choice_) return Phase::pick;
@@ -166,28 +151,8 @@ Phase Run::choose() {
     tell("no_pick", "no part is seen that an open slot takes");
     return finish("part_missing", name_of(next) + " waits for a part that is not seen");
   }
-  report_.note = why.empty() ? counted(plan.reasons) : joined(why);
+  report_.note = why.empty() ? text_of(plan.reasons) : text_of(why);
   return next_resort();
-}
-
-Phase Run::next_resort() {
-  if (resort_ == Resort::none && chooser_.has_more_grippers()) {
-    resort_ = Resort::next_gripper;
-    return Phase::choose;
-  }
-  if (resort_ < Resort::full_tilt) {
-    resort_ = Resort::full_tilt;
-    return Phase::choose;
-  }
-  if (pushes_ < kMostPushes) {
-    resort_ = Resort::push;
-    return Phase::push;
-  }
-  const std::string note = report_.note;
-  tell("no_pick", note);
-  if (std::all_of(sight_.seen.begin(), sight_.seen.end(), [](const auto& seen) { return seen.second == 0; }))
-    return finish("not_empty_no_object", "something lies in the bin, and no part is found in it");
-  return finish("not_pickable", "no part can be picked: " + note);
 }
 
 Phase Run::pick() {
@@ -248,110 +213,6 @@ Phase Run::place() {
   return Phase::scan;
 }
 
-Phase Run::regrasp() {
-  const Entry standing = *now().at_station;
-  grasp::PlanOptions options = chooser_.plan_options(Resort::full_tilt, {});
-  for (const Failed& f : failed_) options.failed.push_back(f.pick);
-  Places places = chooser_.places(now().filling);
-  const grasp::Plan plan = links_.vision->plan_standing(standing.part, standing.base_from_part, options, places);
-  const auto give_up = [&](const std::string& why) {  // the others go on without a station
-    station_trouble_ = standing.part + " stands at the station and " + why + ": take it away, then say --slot-is empty";
-    failures_ = 0;
-    tell("no_pick", station_trouble_);
-    return Phase::scan;
-  };
-  // To a slot; or, where it stands turned over, to where it stands as in a slot.
-  for (const Chooser::Where where : kAll)
-    for (const grasp::Grasp& grasp : plan.grasps) {
-      Entry held = standing;
-      held.gripper = grasp.gripper, held.opening_mm = grasp.opening_before_mm;
-      held.tcp_from_part = grasp.part_from_tcp.inverse();
-      const Pose flange =
-          grasp.path.back().base_from_tcp * chooser_.shape(grasp.gripper).gripper.flange_from_tcp.inverse();
-      if (!chooser_.way(here(), grasp.path.front().base_from_tcp, grasp.gripper)) continue;
-      const auto placing = chooser_.place(held, now().filling, {flange, grasp.path.back().joints}, where);
-      if (!placing) continue;
-      if (where != Chooser::Where::slots) {
-        const Pose turn = placing->base_from_part.inverse() * standing.base_from_part;
-        if (rotation_angle(turn.linear(), Matrix3::Identity()) < kTurned || ++turns_ > kMostTurns) continue;
-      }
-      Choice choice;
-      choice.grasp = grasp;
-      choice.part.base_from_part = standing.base_from_part;
-      choice.placing = *placing;
-      if (carry_out_pick(choice, standing.scene, true)) {
-        failures_ = 0;
-        return Phase::place;
-      }
-      failed_.push_back(
-          {{grasp.at(grasp::Step::pick)->base_from_tcp, grasp.gripper}, standing.base_from_part.translation(), scene_});
-      tell("missed", "at the station");
-      return ++failures_ >= kMostFailures ? give_up("is not gripped") : Phase::regrasp;
-    }
-  return give_up("no grasp leads from there to a slot (" + counted(plan.reasons) + ")");
-}
-
-Phase Run::push() {
-  const std::string note = report_.note;
-  const grasp::PushPlan plan = links_.vision->plan_pushes(chooser_.plan_options(Resort::push, {}));
-  ++pushes_;
-  for (const grasp::Push& push : plan.pushes) {
-    const ArmWithTool arm = chooser_.arm_with(push.gripper);
-    std::vector<Pose> poses;
-    for (const grasp::PathPoint& point : push.path) poses.push_back(point.base_from_tcp);
-    const auto stops = stops_at(arm, poses);
-    constexpr std::size_t kMostStops = 6;  // of one command
-    if (!stops || stops->size() > kMostStops || !chooser_.way(here(), poses.front(), push.gripper)) continue;
-    travel(poses.front(), push.gripper);
-    Entry entry;
-    entry.event = Event::move_ordered;
-    entry.scene = scene_;
-    entry.note = "push " + push.part_name;
-    order(entry, robot::CycleCommand::way_points, *stops, push.gripper, kClosed_mm, kPushClass);
-    report_.part = push.part_name, report_.gripper = push.gripper;
-    tell("pushed", note);
-    resort_ = Resort::none;
-    return Phase::scan;
-  }
-  pushes_ = kMostPushes;
-  report_.note = note.empty() ? counted(plan.reasons) : note;
-  return next_resort();
-}
-
 RunEnd run_picking(const RunLinks& links, const RunOptions& options) { return Run(links, options).go(); }
-
-CycleReport plan_first(const WorkCell& cell, const robot::RobotModel& robot, Vision& vision, const Filling& filling,
-                       const robot::SafetyLimits& limits) {
-  const Chooser chooser(cell, robot, vision, limits);
-  CycleReport report;
-  const Sight sight = vision.scan();
-  report.state = "no_pick";
-  report.seen = sight.seen;
-  report.find_ms = sight.find_ms;
-  report.note = sight.status;
-  report.scene = 1;
-  if (!sight.suspect.empty()) report.note = "calibration_suspect: " + sight.suspect;
-  if (!sight.suspect.empty() || sight.status == "empty" || sight.status == "no_data") return report;
-  for (const Resort resort : {Resort::none, Resort::next_gripper, Resort::full_tilt}) {
-    const Stopwatch watch;
-    const grasp::Plan plan = vision.plan(chooser.plan_options(resort, {}), chooser.places(filling));
-    std::vector<std::string> why;
-    const auto choice = chooser.choose(plan, filling, {}, kAll, {}, why);
-    report.plan_ms += watch.ms();
-    report.resort = resort;
-    report.refused = plan.reasons;
-    report.note = why.empty() ? counted(plan.reasons) : joined(why);
-    if (!choice) continue;
-    report.state = "planned";
-    report.note.clear();
-    report.part = choice->grasp.part_name, report.gripper = choice->grasp.gripper, report.grasp = choice->grasp.family;
-    report.slot = choice->placing.slot ? choice->placing.slot->number : 0;
-    report.base_from_part = choice->part.base_from_part;
-    report.base_from_tcp = choice->grasp.at(grasp::Step::pick)->base_from_tcp;
-    report.score = choice->grasp.score, report.terms = choice->grasp.terms;
-    break;
-  }
-  return report;
-}
 
 }  // namespace tribin::picking

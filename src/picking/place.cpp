@@ -135,6 +135,7 @@ bool arm_is_clear(const ArmWithTool& arm, const Stop& from, std::span<const Stop
     const int steps = 1 + static_cast<int>(std::max(move.norm() / kStep_mm, turn.norm() / kStep));
     robot::ReachOptions options;
     options.from = last.joints;
+    options.form = form_bits(*arm.arm, stop.joints);  // as the command says
     for (int i = 1; i <= steps; ++i) {
       const double share = static_cast<double>(i) / steps;
       robot::Joints joints{};

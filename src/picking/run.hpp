@@ -4,6 +4,13 @@
 
 namespace tribin::picking {
 
+inline constexpr int kMostFailures = 10;  // grips in a row that held nothing: something else is wrong
+inline constexpr Chooser::Where kAllPlaces[] = {Chooser::Where::slots, Chooser::Where::station, Chooser::Where::turned};
+
+/// For people: what software refuses; the most frequent reasons of a plan.
+std::string text_of(const std::vector<std::string>& texts);
+std::string text_of(const std::vector<grasp::WhyCount>& reasons);
+
 /// One run of the cycle, from phase to phase.
 class Run {
  public:
@@ -11,7 +18,7 @@ class Run {
   RunEnd go();
 
  private:
-  // The phases; each gives the next one. (recover.cpp and cycle.cpp)
+  // The phases; each gives the next one. (cycle.cpp, recover.cpp, resorts.cpp)
   Phase recover();
   Phase scan();
   Phase choose();

@@ -6,6 +6,7 @@
 
 #include "tribin/core/error.hpp"
 #include "tribin/finder/finder.hpp"
+#include "tribin/picking/place.hpp"
 
 namespace tribin::picking {
 namespace {
@@ -57,7 +58,9 @@ class CameraVision : public Vision {
                             const Places& places) override {
     grasp::Scene scene = scene_;
     scene.scan = nullptr;
-    scene.bin.reset();
+    scene.bin.reset();  // it does not stand in the bin: the walls are in the way, and no more
+    if (from_.cell->bin)
+      for (const grasp::Convex& wall : bodies_of(*from_.cell->bin)) scene.obstacles.push_back(wall);
     scene.parts.clear();
     grasp::PartHere here;
     here.part = &known(part);
