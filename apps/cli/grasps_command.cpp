@@ -97,7 +97,10 @@ void add_grasps(CLI::App& app, Context& context) {
   command->add_flag("--no-arm", options->no_arm, "Leave the cell's robot out: neither reach nor links are checked");
   command->add_option("--waist-deg", options->waist_deg, "Where the waist of a dual-arm robot stands")->type_name("X");
   command->add_flag("--pushes", options->pushes, "Plan pushes too");
-  command->add_option("--scan-unit", options->scan_unit, "Unit of clouds: mm, m, auto")->type_name("U");
+  command
+      ->add_option("--scan-unit,--depth-unit", options->scan_unit,
+                   "Unit of clouds and of depth images of floats: mm, m, auto")
+      ->type_name("U");
   command->add_option("--json", options->json, "Write the plan as JSON; - is stdout")->type_name("OUT|-");
   add_no_cache(command, options->no_cache);
   command->callback([options, &context] { context.run = [options, &context] { return run(*options, context); }; });

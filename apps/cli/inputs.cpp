@@ -59,7 +59,8 @@ void add_any_scan(CLI::App* command, std::string& scan, std::string& camera, std
       ->add_option("SCAN", scan, "Scan: PCD, PLY, depth PNG or TIFF with camera.json, NPY; loose points too, also XYZ")
       ->required();
   command->add_option("--camera", camera, "Camera file of a depth image")->type_name("FILE");
-  command->add_option("--scan-unit", unit, "Unit of clouds: mm, m, auto")->type_name("U");
+  command->add_option("--scan-unit,--depth-unit", unit, "Unit of clouds and of depth images of floats: mm, m, auto")
+      ->type_name("U");
 }
 
 void add_no_cache(CLI::App* command, bool& no_cache) {

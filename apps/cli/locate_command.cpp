@@ -179,7 +179,10 @@ void add_locate(CLI::App& app, Context& context) {
       ->check(CLI::NonNegativeNumber)
       ->type_name("N");
   command->add_option("--unit", options->unit, "Unit of CAD files that name none: mm, cm, m, inch")->type_name("U");
-  command->add_option("--scan-unit", options->scan_unit, "Unit of clouds: mm, m, auto")->type_name("U");
+  command
+      ->add_option("--scan-unit,--depth-unit", options->scan_unit,
+                   "Unit of clouds and of depth images of floats: mm, m, auto")
+      ->type_name("U");
   command
       ->add_option("--method", options->method,
                    "surfel, or paper: recognition and pose as Barajas et al. have them (docs/paper_method.md)")

@@ -331,7 +331,10 @@ void add_pick(CLI::App& app, Context& context) {
       "(default)");
   command->add_option("--calibration", options->calibration, "rig.json of a camera that gives frames")
       ->type_name("FILE");
-  command->add_option("--scan-unit", options->scan_unit, "Of clouds: auto, mm, m")->type_name("U");
+  command
+      ->add_option("--scan-unit,--depth-unit", options->scan_unit,
+                   "Of clouds and of depth images of floats: auto, mm, m")
+      ->type_name("U");
   command->add_flag("--any-age", options->any_age, "Dry runs with recorded scans: take one however old");
   add_no_cache(command, options->no_cache);
   command->callback([options, &context] { context.run = [options, &context] { return run(*options, context); }; });

@@ -204,7 +204,10 @@ void add_robot_server(CLI::App& app, Context& context) {
       "(default)");
   command->add_option("--calibration", options->calibration, "rig.json of a camera that gives frames")
       ->type_name("FILE");
-  command->add_option("--scan-unit", options->scan_unit, "Of clouds: auto, mm, m")->type_name("U");
+  command
+      ->add_option("--scan-unit,--depth-unit", options->scan_unit,
+                   "Of clouds and of depth images of floats: auto, mm, m")
+      ->type_name("U");
   command->add_option("--port", options->port, "0 = any free one")->check(CLI::Range(0, 65535))->type_name("N");
   command
       ->add_option("--address", options->address,
