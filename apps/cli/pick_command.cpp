@@ -151,7 +151,8 @@ class Guard {
   void enter(picking::Phase phase) {
     heard_s_ = clock_->now_s();
     // What is in the hand or at the station does not lie where a scan saw it.
-    if (phase == picking::Phase::scan || phase == picking::Phase::recover || phase == picking::Phase::regrasp)
+    if (phase == picking::Phase::scan || phase == picking::Phase::recover || phase == picking::Phase::place ||
+        phase == picking::Phase::regrasp)
       scan_s_ = clock_->now_s();
     const bool moves = phase == picking::Phase::pick || phase == picking::Phase::place ||
                        phase == picking::Phase::regrasp || phase == picking::Phase::push;
