@@ -107,6 +107,18 @@ void add_source_arguments(CLI::App* command, SourceArguments& a, Context& contex
   only_experts(command->add_flag("--no-packet-socket", a.no_packet_socket), context);
 }
 
+void add_live_source_arguments(CLI::App* command, SourceArguments& a, std::string& calibration, std::string& scan_unit,
+                               const std::string& each, Context& context) {
+  a.source = "genicam";
+  add_source_arguments(command, a, context);
+  command->get_option("SOURCE")->required(false)->description(
+      "A scan file, read anew at each " + each +
+      "; or a camera as of tribin scan: FRAMES_DIR, sim:CELL.toml, genicam[:ID] (default)");
+  command->add_option("--calibration", calibration, "rig.json of a camera that gives frames")->type_name("FILE");
+  command->add_option("--scan-unit,--depth-unit", scan_unit, "Of clouds and of depth images of floats: auto, mm, m")
+      ->type_name("U");
+}
+
 std::unique_ptr<Camera> open_source(const SourceArguments& arguments) {
   if (begins_with(arguments.source, kSim)) return open_sim(arguments);
   if (arguments.source == kGenicam || begins_with(arguments.source, std::string(kGenicam) + ":"))

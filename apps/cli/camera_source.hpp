@@ -24,6 +24,11 @@ struct SourceArguments {
 
 void add_source_arguments(CLI::App* command, SourceArguments& arguments, Context& context);
 
+/// The same of a command that looks again and again: SOURCE may be left out (genicam) or be a scan file, with the rig
+/// and the unit that go with them. \param each  what a look is for: "cycle", "request"
+void add_live_source_arguments(CLI::App* command, SourceArguments& arguments, std::string& calibration,
+                               std::string& scan_unit, const std::string& each, Context& context);
+
 /// Opens the camera. \throws Error bad_option, naming the package, where its component is not built in.
 std::unique_ptr<Camera> open_source(const SourceArguments& arguments);
 

@@ -1,5 +1,6 @@
 #include "cell_view.hpp"
 
+#include "commands.hpp"
 #include "tribin/core/error.hpp"
 #include "tribin/core/log.hpp"
 #include "tribin/io/cad_files.hpp"
@@ -10,6 +11,13 @@ WorkCell read_work_cell_logged(const std::filesystem::path& file) {
   WorkCell cell = read_work_cell(file);
   for (const std::string& warning : cell.warnings) log(LogLevel::warning, file.filename().string() + ": " + warning);
   return cell;
+}
+
+std::vector<Part> read_parts_of(const WorkCell& cell, bool no_cache) {
+  std::vector<Part> out;
+  for (const CellPart& part : cell.parts)
+    for (Part& read : read_parts({{part.name, part.cad}}, part.unit, no_cache)) out.push_back(std::move(read));
+  return out;
 }
 
 std::vector<Mesh> meshes_of(const WorkCell& cell) {

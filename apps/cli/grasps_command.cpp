@@ -45,10 +45,7 @@ int run(const Options& options, const Context&) {
   if (cell.grippers.empty())
     throw Error(ErrorCode::bad_input, options.cell + ": saw no [[gripper]], wanted at least one");
   const Scan scan = read_scan_logged(options.scan, cell.camera->file.string(), options.scan_unit);
-  std::vector<Part> parts;
-  for (const CellPart& part : cell.parts)
-    for (Part& read : read_parts({{part.name, part.cad}}, part.unit, options.no_cache))
-      parts.push_back(std::move(read));
+  const std::vector<Part> parts = read_parts_of(cell, options.no_cache);
   std::vector<grasp::GraspPart> known;
   std::vector<std::string> warnings;
   for (std::size_t i = 0; i < parts.size(); ++i) {

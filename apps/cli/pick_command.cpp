@@ -88,9 +88,7 @@ Cell open_cell(const Options& options) {
   if (cell.cell.robots.empty())
     throw Error(ErrorCode::bad_input, options.cell + ": saw no [[robot]], wanted the one that picks");
   cell.robot = read_robot(cell.cell.robots.front().model);
-  for (const CellPart& part : cell.cell.parts)
-    for (Part& read : read_parts({{part.name, part.cad}}, part.unit, options.no_cache))
-      cell.parts.push_back(std::move(read));
+  cell.parts = read_parts_of(cell.cell, options.no_cache);
   if (options.simulate > 0) {
     open_simulated(cell, options);
     return cell;
@@ -325,17 +323,7 @@ void add_pick(CLI::App& app, Context& context) {
   command->add_option("--json", options->json, "JSON lines, one a cycle: a file, or - for stdout (default)")
       ->type_name("OUT");
   command->add_option("--report", options->report, "Folder for a page with a film of the run")->type_name("DIR");
-  options->from.source = "genicam";
-  add_source_arguments(command, options->from, context);
-  command->get_option("SOURCE")->required(false)->description(
-      "A scan file, read anew at each cycle; or a camera as of tribin scan: FRAMES_DIR, sim:CELL.toml, genicam[:ID] "
-      "(default)");
-  command->add_option("--calibration", options->calibration, "rig.json of a camera that gives frames")
-      ->type_name("FILE");
-  command
-      ->add_option("--scan-unit,--depth-unit", options->scan_unit,
-                   "Of clouds and of depth images of floats: auto, mm, m")
-      ->type_name("U");
+  add_live_source_arguments(command, options->from, options->calibration, options->scan_unit, "cycle", context);
   command->add_flag("--any-age", options->any_age, "Dry runs with recorded scans: take one however old");
   add_no_cache(command, options->no_cache);
   command->callback([options, &context] { context.run = [options, &context] { return run(*options, context); }; });

@@ -5,6 +5,7 @@
 #include <thread>
 
 #include "camera_source.hpp"
+#include "cell_view.hpp"
 #include "tribin/config/robot_file.hpp"
 #include "tribin/config/work_cell.hpp"
 #include "tribin/core/error.hpp"
@@ -68,9 +69,7 @@ std::optional<TextPick> taught_pick(const CellPart& part, const std::vector<Pose
 class Vision {
  public:
   Vision(const Options& options, const WorkCell& cell) : options_(options), cell_(cell) {
-    for (const CellPart& part : cell.parts)
-      for (Part& read : read_parts({{part.name, part.cad}}, part.unit, options.no_cache))
-        parts_.push_back(std::move(read));
+    parts_ = read_parts_of(cell, options.no_cache);
     for (std::size_t i = 0; i < parts_.size() && !cell.grippers.empty(); ++i) {
       known_.push_back(grasp::prepare_grasps(parts_[i], cell.parts[i], cell.grippers));
       for (const std::string& warning : known_.back().warnings) log(LogLevel::warning, warning);
@@ -161,8 +160,7 @@ robot::TextOptions text_options(const Options& options, const WorkCell& cell) {
 }
 
 int run(const Options& options, const Context&) {
-  const WorkCell cell = read_work_cell(options.cell);
-  for (const std::string& warning : cell.warnings) log(LogLevel::warning, warning);
+  const WorkCell cell = read_work_cell_logged(options.cell);
   if (cell.parts.empty()) throw Error(ErrorCode::bad_input, options.cell + ": saw no [[part]], wanted at least one");
   if (!cell.safety.workspace_mm)
     throw Error(ErrorCode::bad_input,
@@ -197,17 +195,7 @@ void add_robot_server(CLI::App& app, Context& context) {
   command->add_option("--workcell", options->cell, "Camera, hand-eye, parts with their pick points, workspace")
       ->required()
       ->type_name("TOML");
-  options->from.source = "genicam";
-  add_source_arguments(command, options->from, context);
-  command->get_option("SOURCE")->required(false)->description(
-      "A scan file, read anew at each request; or a camera as of tribin scan: FRAMES_DIR, sim:CELL.toml, genicam[:ID] "
-      "(default)");
-  command->add_option("--calibration", options->calibration, "rig.json of a camera that gives frames")
-      ->type_name("FILE");
-  command
-      ->add_option("--scan-unit,--depth-unit", options->scan_unit,
-                   "Of clouds and of depth images of floats: auto, mm, m")
-      ->type_name("U");
+  add_live_source_arguments(command, options->from, options->calibration, options->scan_unit, "request", context);
   command->add_option("--port", options->port, "0 = any free one")->check(CLI::Range(0, 65535))->type_name("N");
   command
       ->add_option("--address", options->address,

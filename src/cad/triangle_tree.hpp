@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "tribin/cad/mesh.hpp"
+#include "tribin/core/box_tree.hpp"
 
 namespace tribin {
 
@@ -15,17 +16,8 @@ class TriangleTree {
   void cross(const Vec3& origin, const Vec3& direction, std::vector<std::uint32_t>& crossed) const;
 
  private:
-  struct Node {
-    Vec3f low, high;
-    std::uint32_t begin = 0, end = 0;  ///< range in order_ of a leaf
-    std::uint32_t right = 0;           ///< the second child; the first follows its parent; 0 = leaf
-  };
-
-  std::uint32_t build(std::uint32_t begin, std::uint32_t end, const std::vector<Vec3f>& centers);
-
   const Mesh& mesh_;
-  std::vector<std::uint32_t> order_;
-  std::vector<Node> nodes_;
+  BoxTree<Vec3f> tree_;
 };
 
 }  // namespace tribin

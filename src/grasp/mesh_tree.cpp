@@ -1,7 +1,6 @@
 #include "mesh_tree.hpp"
 
 #include <algorithm>
-#include <numeric>
 
 #include "gjk.hpp"
 #include "tribin/core/error.hpp"
@@ -37,40 +36,19 @@ MeshTree::MeshTree(const Mesh& mesh) {
     centers.push_back((c[0] + c[1] + c[2]) / 3);
   }
   TRIBIN_ASSERT(!corners_.empty());
-  order_.resize(corners_.size());
-  std::iota(order_.begin(), order_.end(), 0u);
-  build(0, count(), centers);
-}
-
-std::uint32_t MeshTree::build(std::uint32_t begin, std::uint32_t end, const std::vector<Vec3>& centers) {
-  const std::uint32_t id = static_cast<std::uint32_t>(nodes_.size());
-  Node node{Vec3::Constant(1e300), Vec3::Constant(-1e300), begin, end, 0};
-  Vec3 low = node.low, high = node.high;  // of the centres
-  for (std::uint32_t i = begin; i < end; ++i) {
-    for (const Vec3& corner : corners_[order_[i]]) {
-      node.low = node.low.cwiseMin(corner);
-      node.high = node.high.cwiseMax(corner);
+  const auto grow = [this](std::uint32_t triangle, Vec3& low, Vec3& high) {
+    for (const Vec3& corner : corners_[triangle]) {
+      low = low.cwiseMin(corner);
+      high = high.cwiseMax(corner);
     }
-    low = low.cwiseMin(centers[order_[i]]);
-    high = high.cwiseMax(centers[order_[i]]);
-  }
+  };
+  tree_ = make_box_tree(centers, grow, kLeaf);
   // Rays along an edge run in the face of a box: rounding must not put them outside.
   constexpr double kRounding_mm = 1e-6;
-  node.low.array() -= kRounding_mm;
-  node.high.array() += kRounding_mm;
-  nodes_.push_back(node);
-  if (end - begin <= kLeaf) return id;
-  int axis = 0;
-  (high - low).maxCoeff(&axis);
-  const std::uint32_t middle = begin + (end - begin) / 2;
-  std::nth_element(order_.begin() + begin, order_.begin() + middle, order_.begin() + end,
-                   [&](std::uint32_t a, std::uint32_t b) {
-                     return centers[a][axis] != centers[b][axis] ? centers[a][axis] < centers[b][axis] : a < b;
-                   });
-  build(begin, middle, centers);
-  const std::uint32_t right = build(middle, end, centers);
-  nodes_[id].right = right;
-  return id;
+  for (Node& node : tree_.nodes) {
+    node.low.array() -= kRounding_mm;
+    node.high.array() += kRounding_mm;
+  }
 }
 
 std::optional<MeshHit> MeshTree::first_hit(const Vec3& origin, const Vec3& direction, double reach) const {
@@ -81,17 +59,17 @@ std::optional<MeshHit> MeshTree::first_hit(const Vec3& origin, const Vec3& direc
   int depth = 0;
   stack[depth++] = 0;
   while (depth > 0) {
-    const Node& node = nodes_[stack[--depth]];
+    const Node& node = tree_.nodes[stack[--depth]];
     if (enters(node.low, node.high, origin, inverse, least) > least) continue;
     if (node.right != 0) {
-      const std::uint32_t left = static_cast<std::uint32_t>(&node - nodes_.data()) + 1;
+      const std::uint32_t left = static_cast<std::uint32_t>(&node - tree_.nodes.data()) + 1;
       stack[depth++] = node.right;
       stack[depth++] = left;
       continue;
     }
     for (std::uint32_t i = node.begin; i < node.end; ++i) {
       // \source Moeller and Trumbore, "Fast, minimum storage ray-triangle intersection" (1997).
-      const auto& c = corners_[order_[i]];
+      const auto& c = corners_[tree_.order[i]];
       const Vec3 e1 = c[1] - c[0], e2 = c[2] - c[0], p = direction.cross(e2);
       const double det = e1.dot(p);
       if (det == 0) continue;
@@ -100,9 +78,9 @@ std::optional<MeshHit> MeshTree::first_hit(const Vec3& origin, const Vec3& direc
       // Rays through an edge meet one of its triangles at least.
       constexpr double kEdge = 1e-9;
       if (u < -kEdge || v < -kEdge || u + v > 1 + kEdge || t < 0) continue;
-      if (t < least || (t == least && best && order_[i] < best->triangle)) {
+      if (t < least || (t == least && best && tree_.order[i] < best->triangle)) {
         least = t;
-        best = MeshHit{t, order_[i]};
+        best = MeshHit{t, tree_.order[i]};
       }
     }
   }
@@ -112,7 +90,7 @@ std::optional<MeshHit> MeshTree::first_hit(const Vec3& origin, const Vec3& direc
 bool MeshTree::inside(const Vec3& point) const {
   // A direction that no CAD surface is parallel to.
   const Vec3 direction = Vec3(0.2113, 0.4517, 0.8668).normalized();
-  const double reach = (nodes_[0].high - nodes_[0].low).norm() + (point - nodes_[0].low).norm();
+  const double reach = (tree_.nodes[0].high - tree_.nodes[0].low).norm() + (point - tree_.nodes[0].low).norm();
   const auto hit = first_hit(point, direction, reach);
   return hit && normals_[hit->triangle].dot(direction) > 0;
 }
@@ -152,19 +130,20 @@ double MeshTree::gap_mm(const Convex& body, double enough) const {
   };
   Visit stack[64];
   int depth = 0;
-  stack[depth++] = {0, node_gap(nodes_[0])};
+  stack[depth++] = {0, node_gap(tree_.nodes[0])};
   while (depth > 0 && least > 0) {
     const Visit visit = stack[--depth];
     if (visit.gap >= least) continue;
-    const Node& node = nodes_[visit.node];
+    const Node& node = tree_.nodes[visit.node];
     if (node.right == 0) {
       for (std::uint32_t i = node.begin; i < node.end; ++i) {
-        if (normals_[order_[i]].isZero()) continue;
-        least = std::min(least, triangle_gap(order_[i], body, least));
+        if (normals_[tree_.order[i]].isZero()) continue;
+        least = std::min(least, triangle_gap(tree_.order[i], body, least));
       }
       continue;
     }
-    Visit near{visit.node + 1, node_gap(nodes_[visit.node + 1])}, far{node.right, node_gap(nodes_[node.right])};
+    Visit near{visit.node + 1, node_gap(tree_.nodes[visit.node + 1])},
+        far{node.right, node_gap(tree_.nodes[node.right])};
     if (far.gap < near.gap) std::swap(near, far);
     stack[depth++] = far;
     stack[depth++] = near;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "tribin/cad/mesh.hpp"
+#include "tribin/core/box_tree.hpp"
 #include "tribin/grasp/convex.hpp"
 
 namespace tribin::grasp {
@@ -35,18 +36,12 @@ class MeshTree {
   std::uint32_t count() const { return static_cast<std::uint32_t>(corners_.size()); }
 
  private:
-  struct Node {
-    Vec3 low, high;
-    std::uint32_t begin = 0, end = 0;  ///< of order_; the first child follows its parent
-    std::uint32_t right = 0;           ///< second child; 0 = leaf
-  };
-  std::uint32_t build(std::uint32_t begin, std::uint32_t end, const std::vector<Vec3>& centers);
+  using Node = BoxTree<Vec3>::Node;
   double triangle_gap(std::uint32_t triangle, const Convex& body, double enough) const;
 
   std::vector<std::array<Vec3, 3>> corners_;
   std::vector<Vec3> normals_;
-  std::vector<std::uint32_t> order_;
-  std::vector<Node> nodes_;
+  BoxTree<Vec3> tree_;
 };
 
 }  // namespace tribin::grasp

@@ -118,13 +118,7 @@ struct System {
 
 System scaled(const Matrix6& h, const Vector6& b, const std::vector<Vector6>& frozen, const Vec6& scale) {
   System s{scale.asDiagonal() * Mat6(h) * scale.asDiagonal(), scale.asDiagonal() * Vec6(b)};
-  Mat6 keep = Mat6::Identity();
-  for (const Vector6& f : frozen) {
-    Vec6 d = keep * Vec6(f).cwiseQuotient(scale);
-    if (d.norm() < 1e-12) continue;
-    d.normalize();
-    keep -= d * d.transpose();
-  }
+  const Mat6 keep = off_directions(frozen, Vector6(scale));
   s.h = keep * s.h * keep;
   s.b = keep * s.b;
   return s;
@@ -168,6 +162,23 @@ double reach_of_motion(const Pose& a, const Pose& b, const RefineOptions& option
 
 }  // namespace
 
+Vector6 scale_of_motion(double lever_mm) {
+  Vector6 scale;
+  scale << 1, 1, 1, 1 / lever_mm, 1 / lever_mm, 1 / lever_mm;
+  return scale;
+}
+
+Matrix6 off_directions(std::span<const Vector6> directions, const Vector6& scale) {
+  Mat6 keep = Mat6::Identity();
+  for (const Vector6& direction : directions) {
+    Vec6 d = keep * Vec6(direction).cwiseQuotient(Vec6(scale));
+    if (d.norm() < 1e-12) continue;
+    d.normalize();
+    keep -= d * d.transpose();
+  }
+  return Matrix6(keep);
+}
+
 Refinement refine_pose(const RenderMesh& mesh, const SceneDepth& scene, const Pose& start,
                        const RefineOptions& options) {
   Refinement out;
@@ -180,8 +191,7 @@ Refinement refine_pose(const RenderMesh& mesh, const SceneDepth& scene, const Po
       std::pow(std::max(1.0, options.start_scale_mm / end_scale), 1.0 / std::max(1, options.iterations - 2));
   double scale = options.start_scale_mm;
   double kernel = options.kernel_sigmas;
-  Vec6 scale6;
-  scale6 << 1, 1, 1, 1 / options.lever_mm, 1 / options.lever_mm, 1 / options.lever_mm;
+  const Vec6 scale6 = scale_of_motion(options.lever_mm);
   for (int it = 0; it <= options.iterations; ++it) {
     const bool final_pass = it == options.iterations;
     const Eigen::Vector3d center = out.camera_from_part * Eigen::Vector3d(options.center);

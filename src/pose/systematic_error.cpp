@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 
 #include "inside_silhouette.hpp"
 
@@ -24,83 +25,88 @@ Eigen::Matrix<double, kTerms, 1> variances(const NoiseProfile& noise) {
   return v;
 }
 
+using Vec6 = Eigen::Matrix<double, 6, 1>;
+
+/// A pixel that holds the pose: those of the information, no others. One more face would pull where nothing else holds.
+struct HoldingPixel {
+  Vec6 jacobian;
+  double residual = 0;  ///< of the scan's point from the facet [mm]
+  double along = 0;     ///< of the ray and the normal: turns z into the residual
+  double variance = 1;  ///< of the residual [mm^2]
+  double z = 0;         ///< measured
+};
+
+std::optional<HoldingPixel> holding_pixel(const IndexRender& render, const SceneDepth& scene, const Vec3& center,
+                                          double cad_sigma_mm, int i, int j) {
+  const std::size_t at = render.index(i, j);
+  const int u = render.u0 + i * render.step, v = render.v0 + j * render.step;
+  if (render.triangle[at] < 0) return {};
+  const float z = scene.z_mm(u, v);
+  if (!(z > 0) || scene.near_break(u, v) || !inside_silhouette(render, i, j)) return {};
+  const Eigen::Vector3d ray = scene.camera.ray(u, v);
+  const Eigen::Vector3d n = render.normal[static_cast<std::size_t>(render.triangle[at])].cast<double>();
+  HoldingPixel out;
+  out.along = n.dot(ray);
+  out.residual = (z - 1.0 / render.inverse_z[at]) * out.along;
+  const double sigma = std::hypot(scene.sigma_mm(u, v) * out.along, cad_sigma_mm);
+  if (std::abs(out.residual) > 5 * sigma) return {};  // another surface
+  out.jacobian << n, (ray * z - Eigen::Vector3d(center)).cross(n);
+  out.variance = sigma * sigma;
+  out.z = z;
+  return out;
+}
+
+/// Share of the rendered pixels that tell something of their own.
+double independent_share(const IndexRender& render, const SceneDepth& scene) {
+  return 1 / std::max(1.0, correlation_inflation(scene.correlation_px) / (double(render.step) * render.step));
+}
+
 }  // namespace
 
-Matrix6 pull_of_systematic_errors(const RenderMesh& mesh, const SceneDepth& scene, const Pose& camera_from_part,
-                                  const NoiseProfile& noise, const Vec3& center, int step_px, double cad_sigma_mm) {
+Matrix6 pull_of_systematic_errors(const IndexRender& render, const SceneDepth& scene, const NoiseProfile& noise,
+                                  const Vec3& center, double cad_sigma_mm) {
   const Eigen::Matrix<double, kTerms, 1> variance = variances(noise);
   if (variance.isZero()) return Matrix6::Zero();
-  thread_local IndexRender render;
-  render_index(mesh, scene.camera, camera_from_part, step_px, render);
   const PinholeCamera& camera = scene.camera;
   Response response = Response::Zero();
   for (int j = 0; j < render.height; ++j)
     for (int i = 0; i < render.width; ++i) {
-      const std::int32_t k = render.triangle[render.index(i, j)];
-      if (k < 0) continue;
-      const int u = render.u0 + i * render.step, v = render.v0 + j * render.step;
-      const float z = scene.z_mm(u, v);
-      // The pixels of the information, no others: one more face would pull where nothing else holds.
-      if (!(z > 0) || scene.near_break(u, v) || !inside_silhouette(render, i, j)) continue;
-      const Eigen::Vector3d ray = camera.ray(u, v);
-      const Eigen::Vector3d n = render.normal[static_cast<std::size_t>(k)].cast<double>();
-      const double along = n.dot(ray);
-      const double r = (z - 1.0 / render.inverse_z[render.index(i, j)]) * along;
-      const double sigma = std::hypot(scene.sigma_mm(u, v) * along, cad_sigma_mm);
-      if (std::abs(r) > 5 * sigma) continue;  // another surface: it does not hold the pose
-      Eigen::Matrix<double, 6, 1> jac;
-      jac << n, (ray * z - Eigen::Vector3d(center)).cross(n);
-      const double x = 2.0 * u / camera.width - 1, y = 2.0 * v / camera.height - 1;
+      const auto pixel = holding_pixel(render, scene, center, cad_sigma_mm, i, j);
+      if (!pixel) continue;
+      const double x = 2.0 * (render.u0 + i * render.step) / camera.width - 1,
+                   y = 2.0 * (render.v0 + j * render.step) / camera.height - 1, z = pixel->z;
       const std::array<double, kTerms> terms = {z, z * x, z * y, z * x * x, z * x * y, z * y * y, 1};
       for (int t = 0; t < kTerms; ++t)
-        response.col(t) += jac * (along * terms[static_cast<std::size_t>(t)] / (sigma * sigma));
+        response.col(t) += pixel->jacobian * (pixel->along * terms[static_cast<std::size_t>(t)] / pixel->variance);
     }
-  const double independent =
-      1 / std::max(1.0, correlation_inflation(scene.correlation_px) / (double(step_px) * step_px));
-  response *= independent;
+  response *= independent_share(render, scene);
   return Matrix6(response * variance.asDiagonal() * response.transpose());
 }
 
-Matrix6 pull_of_patches(const RenderMesh& mesh, const SceneDepth& scene, const Pose& camera_from_part,
-                        const Vec3& center, int step_px, double cad_sigma_mm) {
+Matrix6 pull_of_patches(const IndexRender& render, const SceneDepth& scene, const Vec3& center, double cad_sigma_mm) {
   constexpr double kPatches = 25;
   constexpr int kLeast = 12;  // twice the six numbers that the fit has taken from them
-  thread_local IndexRender render;
-  render_index(mesh, scene.camera, camera_from_part, step_px, render);
   const auto covered = std::count_if(render.triangle.begin(), render.triangle.end(), [](auto t) { return t >= 0; });
   const int patch = std::max(4, static_cast<int>(std::lround(std::sqrt(static_cast<double>(covered) / kPatches))));
-  using Vec6 = Eigen::Matrix<double, 6, 1>;
   Eigen::Matrix<double, 6, 6> sum = Eigen::Matrix<double, 6, 6>::Zero();
   int patches = 0;
   for (int j0 = 0; j0 < render.height; j0 += patch)
     for (int i0 = 0; i0 < render.width; i0 += patch) {
       Vec6 pull = Vec6::Zero();
-      int n = 0;
+      bool any = false;
       for (int j = j0; j < std::min(render.height, j0 + patch); ++j)
         for (int i = i0; i < std::min(render.width, i0 + patch); ++i) {
-          const std::size_t k = render.index(i, j);
-          const int u = render.u0 + i * render.step, v = render.v0 + j * render.step;
-          const float z = scene.z_mm(u, v);
-          if (render.triangle[k] < 0 || !(z > 0) || scene.near_break(u, v) || !inside_silhouette(render, i, j))
-            continue;
-          const Eigen::Vector3d ray = scene.camera.ray(u, v);
-          const Eigen::Vector3d normal = render.normal[static_cast<std::size_t>(render.triangle[k])].cast<double>();
-          const double along = normal.dot(ray);
-          const double r = (z - 1.0 / render.inverse_z[k]) * along;
-          const double sigma = std::hypot(scene.sigma_mm(u, v) * along, cad_sigma_mm);
-          if (std::abs(r) > 5 * sigma) continue;  // another surface: it does not hold the pose
-          Vec6 jac;
-          jac << normal, (ray * z - Eigen::Vector3d(center)).cross(normal);
-          pull += jac * (r / (sigma * sigma));
-          ++n;
+          const auto pixel = holding_pixel(render, scene, center, cad_sigma_mm, i, j);
+          if (!pixel) continue;
+          pull += pixel->jacobian * (pixel->residual / pixel->variance);
+          any = true;
         }
-      if (n == 0) continue;
+      if (!any) continue;
       sum += pull * pull.transpose();
       ++patches;
     }
   if (patches < kLeast) return Matrix6::Zero();
-  const double independent =
-      1 / std::max(1.0, correlation_inflation(scene.correlation_px) / (double(step_px) * step_px));
+  const double independent = independent_share(render, scene);
   return Matrix6(sum * (independent * independent * patches / (patches - 6.0)));
 }
 

@@ -12,6 +12,19 @@ struct CellMask {
   std::vector<std::uint64_t> bits;  ///< empty = none
   int count = 0;                    ///< bits that are set
 
+  /// None of so many cells.
+  static CellMask none_of(std::size_t cells) {
+    CellMask out;
+    out.bits.assign((cells + 63) / 64, 0);
+    return out;
+  }
+
+  void add(std::size_t cell) {
+    const std::uint64_t bit = std::uint64_t{1} << (cell % 64);
+    count += !(bits[cell / 64] & bit);
+    bits[cell / 64] |= bit;
+  }
+
   bool holds(std::size_t cell) const { return cell / 64 < bits.size() && (bits[cell / 64] >> (cell % 64) & 1); }
 
   int shared(const CellMask& other) const {

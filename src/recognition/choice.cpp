@@ -2,7 +2,6 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <numeric>
 
@@ -175,8 +174,7 @@ void compare(const SceneDepth& scene, const Part& part, int step, int iterations
 /// there that refinement does not leave.
 void add_weakest_moves(const Part& part, const PoseCandidate& from, std::vector<Pose>& out) {
   using Vec6 = Eigen::Matrix<double, 6, 1>;
-  Vec6 scale;
-  scale << 1, 1, 1, 1 / part.gyration_mm, 1 / part.gyration_mm, 1 / part.gyration_mm;
+  const Vec6 scale = scale_of_motion(part.gyration_mm);
   const Eigen::Matrix<double, 6, 6> h =
       scale.asDiagonal() * Eigen::Matrix<double, 6, 6>(from.information) * scale.asDiagonal();
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> eigen(h);
@@ -191,9 +189,8 @@ void add_weakest_moves(const Part& part, const PoseCandidate& from, std::vector<
 }  // namespace
 
 CellMask mask_of(const Part& part, const SceneDepth& scene, const PoseCandidate& candidate) {
-  CellMask mask;
   const Image<Vec3f>& cells = scene.cell_normal;
-  mask.bits.assign((cells.size() + 63) / 64, 0);
+  CellMask mask = CellMask::none_of(cells.size());
   IndexRender render;
   render_index(part.render_mesh, scene.camera, candidate.camera_from_part, scene.cell_px, render);
   const double near_mm = 0.02 * part.diameter_mm;
@@ -205,11 +202,8 @@ CellMask mask_of(const Part& part, const SceneDepth& scene, const PoseCandidate&
       const float z = scene.z_mm(u, v);
       if (!(z > 0) || std::abs(z - 1 / render.inverse_z[k]) > near_mm + 5 * scene.sigma_mm(u, v)) continue;
       const int cu = u / scene.cell_px, cv = v / scene.cell_px;
-      if (!cells.contains(cu, cv)) continue;
-      const std::size_t b = cells.index(cu, cv);
-      mask.bits[b / 64] |= std::uint64_t{1} << (b % 64);
+      if (cells.contains(cu, cv)) mask.add(cells.index(cu, cv));
     }
-  for (const std::uint64_t b : mask.bits) mask.count += std::popcount(b);
   return mask;
 }
 

@@ -222,8 +222,7 @@ Mat6 moved_by_camera(const Vec3& at, double sigma_mm, double sigma_rad) {
 
 /// Of the fit, about the rim's middle: noise, the sensor's smooth errors, and how the bin differs from its model.
 Mat6 covariance_of(const BinModel& model, const SceneDepth& scene, const BinFit& fit, int step) {
-  Vec6 scale;
-  scale << 1, 1, 1, 1 / model.lever_mm, 1 / model.lever_mm, 1 / model.lever_mm;
+  const Vec6 scale = scale_of_motion(model.lever_mm);
   const Mat6 h = scale.asDiagonal() * Mat6(fit.information) * scale.asDiagonal();
   const Eigen::SelfAdjointEigenSolver<Mat6> eigen(h);
   const double inflation = std::max(1.0, fit.rms_sigma * fit.rms_sigma);
@@ -233,9 +232,10 @@ Mat6 covariance_of(const BinModel& model, const SceneDepth& scene, const BinFit&
     held += eigen.eigenvectors().col(k) * eigen.eigenvectors().col(k).transpose() /
             std::max(least, eigen.eigenvalues()(k) / inflation);
   const Vec3 at = fit.camera_from_bin * model.rim_middle;
+  IndexRender render;
+  render_index(model.level, scene.camera, fit.camera_from_bin, step, render);
   const Mat6 pull = scale.asDiagonal() *
-                    Mat6(pull_of_systematic_errors(model.level, scene, fit.camera_from_bin, scene.surfels->scan->noise,
-                                                   at, step, 0)) *
+                    Mat6(pull_of_systematic_errors(render, scene, scene.surfels->scan->noise, at, 0)) *
                     scale.asDiagonal();
   const double shape = kShapeSigma * model.longest_mm;
   const Mat6 c = held + held * pull * held / (inflation * inflation) + shape * shape * Mat6::Identity();

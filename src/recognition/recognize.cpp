@@ -9,6 +9,7 @@
 #include "likelihood.hpp"
 #include "tribin/core/error.hpp"
 #include "tribin/core/parallel.hpp"
+#include "tribin/pose/index_render.hpp"
 #include "tribin/pose/systematic_error.hpp"
 #include "tribin/recognition/bin.hpp"
 #include "weak_directions.hpp"
@@ -86,10 +87,10 @@ Instance make_instance(const Polished& p, std::span<const Part> parts, const Sce
                          std::max(step, step_for(part, scene, p.candidate.camera_from_part, 10000)), refined);
   out.camera_from_part = refined.camera_from_part;
   const Vec3 center(out.camera_from_part * part.box_center());
-  const Matrix6 pull = pull_of_systematic_errors(part.render_mesh, scene, out.camera_from_part, noise, center, step,
-                                                 options.cad_sigma_mm);
-  const Matrix6 patches =
-      pull_of_patches(part.render_mesh, scene, out.camera_from_part, center, step, options.cad_sigma_mm);
+  thread_local IndexRender render;
+  render_index(part.render_mesh, scene.camera, out.camera_from_part, step, render);
+  const Matrix6 pull = pull_of_systematic_errors(render, scene, noise, center, options.cad_sigma_mm);
+  const Matrix6 patches = pull_of_patches(render, scene, center, options.cad_sigma_mm);
   describe_uncertainty(part, pull, patches, refined, out);
   describe_evidence(part, scene, features, out);
 
@@ -277,10 +278,9 @@ std::vector<Polished> choose(const SceneFeatures& features, const SceneDepth& sc
 
 /// The cells that are not flagged.
 CellMask all_but(const Image<std::uint8_t>& flags) {
-  CellMask out;
-  out.bits.assign(flags.size() / 64 + 1, 0);
+  CellMask out = CellMask::none_of(flags.size());
   for (std::size_t i = 0; i < flags.size(); ++i)
-    if (!flags.data[i]) out.bits[i / 64] |= std::uint64_t{1} << (i % 64), ++out.count;
+    if (!flags.data[i]) out.add(i);
   return out;
 }
 
@@ -345,16 +345,16 @@ Instances recognize(const Primitives& primitives, const PrimitiveModel& observat
     };
     if (const double sure = instance.score / share_of_first(instance); sure < kGivenOut) {
       kept_back("probability", sure, kGivenOut);
-    } else if (instance.score < kGivenOut) {
+      continue;
+    }
+    told.join(p.mask);
+    if (instance.score < kGivenOut) {
       kept_back("self_similar", instance.score, kGivenOut);
-      told.join(p.mask);
       out.uncertain.push_back(std::move(instance));
     } else if (instance.p_within_tolerance && *instance.p_within_tolerance < kGivenOut) {
       kept_back("tolerance", *instance.p_within_tolerance, kGivenOut);
-      told.join(p.mask);
       out.uncertain.push_back(std::move(instance));
     } else {
-      told.join(p.mask);
       out.items.push_back(std::move(instance));
     }
   }

@@ -44,16 +44,11 @@ std::vector<Vector6> free_directions_about_center(const Part& part, const Pose& 
 void describe_uncertainty(const Part& part, const Matrix6& systematic_pull, const Matrix6& patch_pull,
                           const Refinement& refinement, Instance& instance) {
   const double lever = part.gyration_mm;
-  Vec6 scale;
-  scale << 1, 1, 1, 1 / lever, 1 / lever, 1 / lever;
+  const Vec6 scale = scale_of_motion(lever);
   // Fit residuals beyond the noise (a casting, an unknown systematic term) count as noise.
   const double inflation = std::max(1.0, refinement.rms_sigma * refinement.rms_sigma);
   Mat6 h = scale.asDiagonal() * Mat6(refinement.information) * scale.asDiagonal();
-  Mat6 keep = Mat6::Identity();
-  for (const Vector6& f : free_directions_about_center(part, instance.camera_from_part)) {
-    const Vec6 d = Vec6(f).cwiseQuotient(scale).normalized();
-    keep -= d * d.transpose();
-  }
+  const Mat6 keep = off_directions(free_directions_about_center(part, instance.camera_from_part), Vector6(scale));
   h = keep * h * keep;
   const Eigen::SelfAdjointEigenSolver<Mat6> eigen(h);
   const std::size_t free_count = part.symmetry.continuous.size();

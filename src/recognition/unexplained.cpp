@@ -136,9 +136,8 @@ std::vector<UnexplainedRegion> unexplained_regions(const SceneFeatures& scene, s
 std::optional<Ground> ground_around(const Surfels& surfels, const Primitives& primitives,
                                     std::span<const std::uint32_t> members) {
   const Image<std::int32_t>& grid = surfels.surfel_of_cell;
-  CellMask own;
-  own.bits.assign(grid.size() / 64 + 1, 0);
-  for (const std::uint32_t s : members) own.bits[surfels.cell[s] / 64] |= std::uint64_t{1} << (surfels.cell[s] % 64);
+  CellMask own = CellMask::none_of(grid.size());
+  for (const std::uint32_t s : members) own.add(surfels.cell[s]);
   // The planes of the cells within six of it: as far as an edge and its shadow spoil, mostly.
   constexpr int kReach = 6;
   std::vector<int> met(primitives.items.size() + 1, 0);

@@ -98,17 +98,9 @@ Peak find_peak(const Profile& profile, double reach, double pixel) {
 
 void settle_weak_directions(const Part& part, const SceneDepth& scene, std::span<const Vector6> frozen, int step_px,
                             Refinement& refined) {
-  const double lever = part.gyration_mm;
   const double pixel = (refined.camera_from_part * part.box_center()).z() / scene.camera.fx;
-  Vec6 scale;
-  scale << 1, 1, 1, 1 / lever, 1 / lever, 1 / lever;
-  Mat6 keep = Mat6::Identity();
-  for (const Vector6& f : frozen) {
-    Vec6 d = keep * Vec6(f).cwiseQuotient(scale);
-    if (d.norm() < 1e-12) continue;
-    d.normalize();
-    keep -= d * d.transpose();
-  }
+  const Vec6 scale = scale_of_motion(part.gyration_mm);
+  const Mat6 keep = off_directions(frozen, Vector6(scale));
   const Mat6 h = keep * Mat6(scale.asDiagonal() * Mat6(refined.information) * scale.asDiagonal()) * keep;
   const Eigen::SelfAdjointEigenSolver<Mat6> eigen(h);
   // An outline's precision is a tenth of a pixel: what is held so well needs no second look.

@@ -165,6 +165,15 @@ TEST(Cycle, ATightSlotIsRefusedWithItsReason) {
   EXPECT_EQ(bench.truth.grips, 0);
 }
 
+/// The order to pick part b for slot 2.
+Entry order_of_next(const Journal& journal) {
+  Entry entry;
+  entry.event = Event::pick_ordered;
+  entry.cycle = journal.state().last_cycle + 1;
+  entry.part = "b", entry.gripper = "jaw", entry.slot = 2;
+  return entry;
+}
+
 TEST(Cycle, WhereTheControllerCannotTellItAsks) {
   Bench bench(6);
   RunOptions options;
@@ -172,10 +181,7 @@ TEST(Cycle, WhereTheControllerCannotTellItAsks) {
   bench.run(options);
   {  // ordered, and then the controller lost its variables
     Journal journal(bench.folder.path() / "rack.ndjson", 6);
-    Entry entry;
-    entry.event = Event::pick_ordered;
-    entry.cycle = journal.state().last_cycle + 1;
-    entry.part = "b", entry.gripper = "jaw", entry.slot = 2;
+    Entry entry = order_of_next(journal);
     journal.write(entry);
     entry.event = Event::picked;
     journal.write(entry);
@@ -201,11 +207,7 @@ TEST(Cycle, AnOrderThatWasNeverTakenIsForgotten) {
   bench.run(options);
   {
     Journal journal(bench.folder.path() / "rack.ndjson", 6);
-    Entry entry;
-    entry.event = Event::pick_ordered;
-    entry.cycle = journal.state().last_cycle + 1;
-    entry.part = "b", entry.gripper = "jaw", entry.slot = 2;
-    journal.write(entry);
+    journal.write(order_of_next(journal));
   }
   EXPECT_EQ(bench.run().status, "rack_full");
   bench.expect_truth_is_as_told();

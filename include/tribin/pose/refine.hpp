@@ -1,5 +1,6 @@
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "tribin/pose/index_render.hpp"
@@ -28,6 +29,12 @@ struct Refinement {
   double rms_mm = 0;     ///< of their residuals along the surface normal
   double rms_sigma = 0;  ///< the same in units of the local sigma
 };
+
+/// (mm, rad) = scale * coordinates in which radians count `lever_mm`.
+Vector6 scale_of_motion(double lever_mm);
+
+/// The projection off directions (mm, rad) that are free or frozen, in the coordinates of scale_of_motion.
+Matrix6 off_directions(std::span<const Vector6> directions, const Vector6& scale);
 
 /// Moves a pose so that the CAD surface meets the scan: projective association by an index render, point-to-plane
 /// residuals against the facet that each pixel sees, Geman-McClure weights with a falling scale.
