@@ -18,52 +18,89 @@ constexpr double kTight_mm = 1;   // what the lip of a cup follows
 constexpr double kReach_mm = 3;   // how far a cup's bellows draw a part near, or are pressed in
 constexpr double kCupSafety = 2;  // of a cup's force, for the acceleration of the arm
 
+/// A point that is touched, frame of the TCP.
+struct Touch {
+  Vec3 at;
+  Vec3 normal;  ///< of the contact, unit; the jaw's own direction where its flat meets the part
+};
+
 struct Contact {
-  double at = 0;             ///< along the jaw's direction from the tool's axis
-  std::vector<Vec3> points;  ///< that are touched, frame of the TCP
-  double across = 0;         ///< best cosine between the surface's normal and the jaw's direction
+  double at = 0;  ///< along the jaw's direction from the tool's axis
+  std::vector<Touch> touches;
   bool any = false;
   bool through = false;  ///< the part goes on where the jaw is
 };
+
+/// The flat of a pad, seen along the way of its jaw.
+struct Flat {
+  const grasp::Pad& pad;
+  Vec3 side;  ///< along its width, unit
+
+  /// How far a point lies within its rim [mm]; negative outside.
+  double within(const Vec3& p) const {
+    return std::min(pad.width_mm / 2 - std::abs(p.dot(side)),
+                    std::min(pad.tip_mm - p.z(), p.z() - pad.tip_mm + pad.length_mm));
+  }
+};
+
+/// Normal of what the rim of a pad meets at a point. Where the part does not rise beyond the rim, the point is the
+/// highest one around, and the flat of the pad meets it, edge or face; where it does rise, the rim meets the face that
+/// rises.
+/// \param beyond  points outside the rim that are higher, as (place, height)
+Vec3 rim_normal(const Touch& touch, double height, const std::vector<std::pair<Vec3, double>>& beyond, double near_mm,
+                const Vec3& direction) {
+  Vec3 up_hill = Vec3::Zero();  // the steepest way, by its rise for each mm
+  for (const auto& [q, higher] : beyond) {
+    const Vec3 way = q - touch.at;
+    const Vec3 flat = way - way.dot(direction) * direction;
+    const double rise = (higher - height) / std::max(flat.norm(), 1e-3);
+    if (flat.norm() < near_mm && rise > up_hill.norm()) up_hill = rise * flat.normalized();
+  }
+  const Vec3 of_rise = (direction - up_hill).normalized();
+  return touch.normal.dot(direction) > of_rise.dot(direction) ? touch.normal : of_rise;
+}
 
 /// Where a jaw that comes along -direction (inside: along it) touches first, of what lies between the jaws (inside:
 /// around them). \param direction  unit, from the axis to the jaw
 Contact first_touch(const Solid::State& part, const Pose& tcp_from_part, const grasp::GripperShape& gripper,
                     double opening_mm, const Vec3& direction) {
-  const Vec3 side = Vec3::UnitZ().cross(direction);
+  const Flat flat{gripper.pad, Vec3::UnitZ().cross(direction)};
   const double sense =
       gripper.inside ? -1 : 1;  // an outer jaw meets the farthest point first, an inner one the nearest
+  // What lies that near to the rim may be met by it: the shell's spacing, and a half.
+  const double rim_mm = 1.5 * part.diameter / 64;
   Contact contact;
   std::vector<std::pair<double, const Vec3f*>> met;
+  std::vector<std::pair<Vec3, double>> outside;
   double best = -1e30;
   for (const Vec3f& point : part.shell.points) {
     const Vec3 p = tcp_from_part * point.cast<double>();
-    if (std::abs(p.dot(side)) > gripper.pad.width_mm / 2) continue;
-    if (p.z() > gripper.pad.tip_mm || p.z() < gripper.pad.tip_mm - gripper.pad.length_mm) continue;
+    const double within = flat.within(p);
+    if (within < -rim_mm) continue;
     const double s = p.dot(direction);
+    if (within < 0) {
+      if (s > 0) outside.push_back({p, sense * s});
+      continue;
+    }
     const double beyond = s - opening_mm / 2;
     contact.through = contact.through || (!gripper.inside && beyond > kSeat_mm && beyond < kInJaw_mm);
     if (gripper.inside ? s <= 0 : std::abs(s) > opening_mm / 2 + kSeat_mm) continue;
     met.push_back({sense * s, &point});
     best = std::max(best, sense * s);
   }
-  const grasp::Pad& pad = gripper.pad;
-  const double rim_mm = 1.5 * part.diameter / 64;  // what lies on the rim of a pad: the shell's spacing, and a half
+  std::erase_if(outside, [best](const auto& point) { return point.second < best; });
   for (const auto& [s, point] : met) {
     if (s < best - kSeat_mm) continue;
-    const Vec3 p = tcp_from_part * point->cast<double>();
-    contact.points.push_back(p);
-    const bool inside_pad = std::abs(p.dot(side)) < pad.width_mm / 2 - rim_mm && p.z() < pad.tip_mm - rim_mm &&
-                            p.z() > pad.tip_mm - pad.length_mm + rim_mm;
-    if (inside_pad) {  // whatever the part is like there, the flat of the pad meets it
-      contact.across = 1;
-      continue;
+    Touch touch{tcp_from_part * point->cast<double>(), direction};
+    if (flat.within(touch.at) <= rim_mm) {  // farther in, the flat meets it whatever the part is like there
+      Vec3f normal;
+      part.field.at(*point, normal);
+      touch.normal = sense * (tcp_from_part.linear() * normal.cast<double>());
+      touch.normal = rim_normal(touch, s, outside, rim_mm, direction);
     }
-    Vec3f normal;
-    part.field.at(*point, normal);
-    contact.across = std::max(contact.across, sense * (tcp_from_part.linear() * normal.cast<double>()).dot(direction));
+    contact.touches.push_back(touch);
   }
-  if (contact.points.empty()) return contact;
+  if (contact.touches.empty()) return contact;
   contact.any = true;
   contact.at = sense * best;
   return contact;
@@ -90,19 +127,23 @@ Closed close_on(const grasp::GripperShape& gripper, double opening_mm, const Sol
   return closed;
 }
 
-/// Cosine between the jaws' way and the best line from one contact to the other: pads press where they are met.
-double straightest(const Contact& a, const Contact& b) {
-  double best = 0;
-  for (const Vec3& p : a.points)
-    for (const Vec3& q : b.points) best = std::max(best, std::abs((p - q).normalized().x()));
-  return best;
-}
-
-/// Friction holds the part as it lies between two jaws.
+/// Friction holds the part: between two jaws along a line that lies in the cones of a contact of each, between more
+/// where a contact of each stands across the jaw's way.
 bool is_steady(const Closed& closed, double cone) {
-  for (const Contact& contact : closed.contacts)
-    if (contact.across < cone) return false;
-  return straightest(closed.contacts[0], closed.contacts[1]) >= cone;
+  if (closed.contacts.size() == 2) {
+    for (const Touch& p : closed.contacts[0].touches)
+      for (const Touch& q : closed.contacts[1].touches) {
+        const Vec3 line = (p.at - q.at).normalized();
+        if (line.dot(p.normal) >= cone && -line.dot(q.normal) >= cone) return true;
+      }
+    return false;
+  }
+  for (std::size_t k = 0; k < closed.contacts.size(); ++k) {
+    const Vec3& way = closed.directions[k];
+    const auto stands = [&](const Touch& touch) { return touch.normal.dot(way) >= cone; };
+    if (std::none_of(closed.contacts[k].touches.begin(), closed.contacts[k].touches.end(), stands)) return false;
+  }
+  return true;
 }
 
 /// Two outer jaws press a part that friction does not hold, and it turns about the tool and about the jaws' height as
@@ -163,10 +204,7 @@ Grip close_jaws(const grasp::GripperShape& gripper, double opening_mm, const Sol
   if (gripper.inside && grip.opening_mm < opening_mm) return refuse("the hole is narrower than the jaws");
   if (grip.opening_mm < gripper.stroke_min() || grip.opening_mm > gripper.stroke_max())
     return refuse("the part's width is outside of the stroke");
-  for (const Contact& contact : closed.contacts)
-    if (contact.across < cone) return refuse("the surface slants: it slips out of the jaws");
-  if (gripper.jaws == 2 && straightest(closed.contacts[0], closed.contacts[1]) < cone)
-    return refuse("the contacts are not opposite each other: it turns out of the jaws");
+  if (!is_steady(closed, cone)) return refuse("the surface slants: it slips or turns out of the jaws");
   if (gripper.gripper.force_n > 0 && gripper.jaws * friction * gripper.gripper.force_n < mass_kg * kGravity)
     return refuse("the force does not carry the part");
   grip.holds = true;

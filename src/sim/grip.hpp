@@ -17,10 +17,11 @@ struct Grip {
 };
 
 /// Jaws close on what lies between their pads; two of them turn the part as long as that lets them close further. It
-/// holds where each jaw touches, the line between the contacts lies in the friction cones, a surface that only the rim
-/// of a pad touches stands across the jaw's way within the friction angle, the width is within the stroke, and the
-/// force carries the part. A cup holds where its rim is tight: the surface under it varies by 1 mm at most. \param
-/// opening_mm  before it closes \param mass_kg     0 = not known: force is not asked for
+/// holds where each jaw touches, the line between two contacts lies in the friction cones of both (a contact's normal
+/// is the jaw's way where the flat of the pad meets the part, and the face's where the rim meets one that rises beyond
+/// it), the width is within the stroke, and the force carries the part. A cup holds where its rim is tight: the surface
+/// under it varies by 1 mm at most. \param opening_mm  before it closes \param mass_kg     0 = not known: force is not
+/// asked for
 Grip close_gripper(const grasp::GripperShape& gripper, double opening_mm, const Solid& part, const Pose& tcp_from_part,
                    double friction, double mass_kg);
 

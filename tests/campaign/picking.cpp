@@ -57,6 +57,21 @@ void judge(const WorkCell& cell, const sim::CellTruth& truth, const picking::Fil
   for (const std::string& why : truth.failed_grips) ++totals.grip_failures[why];
 }
 
+/// How far off vision saw the part that a grip missed, and why it does not hold: "0.4 mm 0.2 deg off: ...".
+std::string about_miss(const sim::CellTruth& truth, const picking::CycleReport& report, const Part& model) {
+  double mm = 1e9, deg = 0;
+  for (const sim::PartTruth& part : truth.parts) {
+    const double off = (part.base_from_part * model.box_center() - report.base_from_part * model.box_center()).norm();
+    if (part.part != report.part || off > mm) continue;
+    mm = off, deg = 1e9;
+    for (const Pose& same : picking::alike(model, report.base_from_part))
+      deg = std::min(deg, rotation_angle(same.linear(), part.base_from_part.linear()) / kDegree);
+  }
+  char text[80];
+  std::snprintf(text, sizeof text, "seen %.2f mm %.2f deg off: ", mm, deg);
+  return text + (truth.failed_grips.empty() ? std::string() : truth.failed_grips.back());
+}
+
 void print(const char* name, const std::map<std::string, int>& counts) {
   std::printf("%s:", name);
   for (const auto& [what, count] : counts) std::printf(" %s %d;", what.c_str(), count);
@@ -131,6 +146,8 @@ int main(int argc, char** argv) try {
                     report.scene, report.state.c_str(), report.part.c_str(), report.grasp.c_str(),
                     report.gripper.c_str(), report.slot, std::string(name_of(report.resort)).c_str(), report.score,
                     report.find_ms, report.plan_ms, report.robot_s, report.note.c_str());
+      if (verbose && report.state == "missed")
+        std::printf("      %s\n", about_miss(simulated.truth(), report, vision->model(report.part)).c_str());
       std::fflush(stdout);
     };
     picking::RunEnd end;
