@@ -1,60 +1,103 @@
-// The run as a page: plain HTML with a few lines of script, pictures beside it.
+// The run as a page, with the tokens and the style of all reports.
 #include <algorithm>
+#include <cctype>
 #include <cmath>
-#include <cstdio>
 
 #include "io/atomic_file.hpp"
 #include "io/png.hpp"
 #include "tribin/core/error.hpp"
 #include "tribin/picking/report.hpp"
+#include "tribin/report/page_kit.hpp"
 
 namespace tribin::picking {
 namespace {
 
 constexpr int kWidth_px = 320;  // of a picture
 
-constexpr const char* kHead = R"(<!doctype html><html lang="en"><meta charset="utf-8"><title>tribin pick</title>
-<style>:root{color-scheme:light dark}body{font:15px/1.5 system-ui,sans-serif;margin:2em auto;max-width:70em;padding:0 1em}
-img{width:640px;max-width:100%;image-rendering:pixelated;border:1px solid #8888}table{border-collapse:collapse}
-td,th{padding:.2em .7em;text-align:left;border-bottom:1px solid #8884;font-variant-numeric:tabular-nums}
-tr.on{background:#48f3}tr[data-frame]{cursor:pointer}.bad{color:#c33}.rack td{border:1px solid #8888;text-align:center}
-</style>)";
+using report::cell;
+using report::escaped;
+using report::number;
+using report::section;
 
-constexpr const char* kScript = R"(<script>
-const rows=[...document.querySelectorAll('tr[data-frame]')],img=document.querySelector('img'),
-range=document.querySelector('input'),play=document.querySelector('button');let at=0,timer=0;
-function show(i){at=(i+rows.length)%rows.length;rows.forEach((r,k)=>r.classList.toggle('on',k===at));
-img.src='scan_'+rows[at].dataset.frame.padStart(4,'0')+'.png';range.value=at}
-rows.forEach((r,i)=>r.onclick=()=>show(i));range.max=rows.length-1;range.oninput=()=>show(+range.value);
-play.onclick=()=>{if(timer){clearInterval(timer);timer=0;play.textContent='Play'}else
-{timer=setInterval(()=>show(at+1),700);play.textContent='Stop'}};if(rows.length)show(0)
-</script>)";
+/// What an end means, in words: the page's first sentence, and whether it is as it should be.
+struct Verdict {
+  const char *status, *sentence, *state;
+};
+constexpr Verdict kVerdicts[] = {
+    {"rack_full", "the rack is full", "ok"},
+    {"empty", "the bin is empty", "ok"},
+    {"most_parts", "as many as were asked for", "ok"},
+    {"recovered", "nothing is open any more", "ok"},
+    {"dry_run", "a dry run: nothing was moved", "ok"},
+    {"not_pickable", "what is left cannot be picked", "warn"},
+    {"not_empty_no_object", "something is left in which no part is found", "warn"},
+    {"part_missing", "a slot waits for a part that is not seen", "warn"},
+    {"no_data", "the scan shows nothing", "bad"},
+    {"calibration_suspect", "the calibration is not to be trusted", "bad"},
+    {"in_doubt", "an operator must look", "bad"},
+};
 
-std::string escaped(const std::string& text) {
-  std::string out;
-  for (const char c : text) out += c == '<' ? "&lt;" : c == '>' ? "&gt;" : c == '&' ? "&amp;" : std::string(1, c);
+Verdict verdict_of(const std::string& status) {
+  for (const Verdict& verdict : kVerdicts)
+    if (status == verdict.status) return verdict;
+  return {"", "the run broke off", "bad"};
+}
+
+/// What became of a cycle, for people.
+std::string words_of(const CycleReport& report) {
+  const std::string slot = report.slot ? " in slot " + std::to_string(report.slot) : "";
+  if (report.state == "placed") return report.part + " placed" + slot;
+  if (report.state == "put_down") return report.part + " put down at the station";
+  if (report.state == "missed") return report.part + " not held";
+  if (report.state == "lost") return report.part + " lost on its way";
+  if (report.state == "pushed") return report.part + " pushed";
+  if (report.state == "planned") return report.part + " would be picked";
+  return "nothing picked";
+}
+
+const char* state_of(const CycleReport& report) {
+  const bool good = report.state == "placed" || report.state == "put_down" || report.state == "planned";
+  return good ? "ok" : report.state == "lost" ? "bad" : "warn";
+}
+
+/// A resort's name for people; the first way needs none.
+std::string words_of(Resort resort) {
+  std::string out = resort == Resort::none ? "" : std::string(name_of(resort));
+  std::replace(out.begin(), out.end(), '_', ' ');
   return out;
 }
 
-std::string cell_of(const std::string& text) { return "<td>" + escaped(text) + "</td>"; }
-
-std::string number(double value, int decimals) {
-  char text[40];
-  std::snprintf(text, sizeof text, "%.*f", decimals, value);
-  return text;
-}
+std::string text_cell(const std::string& text) { return "<td>" + escaped(text) + "</td>"; }
 
 /// The rack from above: grids as they stand, given slots in one row.
-std::string rack_table(const Rack& rack, const Filling& filling) {
-  const std::vector<Slot> slots = slots_of(rack);
-  const auto columns = rack.given.empty() ? static_cast<std::size_t>(rack.slots.columns) : slots.size();
-  std::string out = "<table class=\"rack\">";
+std::string rack_section(const WorkCell& cell_file, const Filling& filling) {
+  const std::vector<Slot> slots = slots_of(*cell_file.rack);
+  const auto columns =
+      cell_file.rack->given.empty() ? static_cast<std::size_t>(cell_file.rack->slots.columns) : slots.size();
+  std::string out = section("rack", "Rack", "Slots in the order of filling, as the journal has them at the end.");
+  out += "<div class=\"box\"><table><tbody>";
   for (std::size_t i = 0; i < slots.size(); ++i) {
-    if (i % columns == 0) out += "<tr>";
-    out += "<td>" + std::to_string(slots[i].number) + "<br>" + (filling[i].empty() ? "&ndash;" : escaped(filling[i])) +
-           "</td>";
+    if (i % columns == 0) out += i ? "</tr><tr>" : "<tr>";
+    int part_class = 0;
+    for (std::size_t k = 0; k < cell_file.parts.size(); ++k)
+      if (cell_file.parts[k].name == filling[i]) part_class = static_cast<int>(k);
+    const std::string holds =
+        filling[i].empty() ? "<span class=\"muted\">empty</span>"
+                           : "<span class=\"name\">" + report::class_tag(part_class) + escaped(filling[i]) + "</span>";
+    out += "<td><span class=\"muted\">" + std::to_string(slots[i].number) + "</span> " + holds + "</td>";
   }
-  return out + "</table>";
+  return out + "</tr></tbody></table></div></section>\n";
+}
+
+std::string reasons_section(const std::map<std::string, int>& reasons) {
+  if (reasons.empty()) return {};
+  std::vector<std::pair<std::string, int>> sorted(reasons.begin(), reasons.end());
+  std::stable_sort(sorted.begin(), sorted.end(), [](const auto& a, const auto& b) { return a.second > b.second; });
+  std::string out = section("refused", "Why grasps were refused",
+                            "Candidates of all plans by the first check that they failed, in the words of the JSON.");
+  out += "<div class=\"box\"><table><thead><tr><th>Check</th><th class=\"num\">Candidates</th></tr></thead><tbody>";
+  for (const auto& [reason, count] : sorted) out += "<tr>" + text_cell(reason) + cell(report::grouped(count)) + "</tr>";
+  return out + "</tbody></table></div></section>\n";
 }
 
 }  // namespace
@@ -83,41 +126,71 @@ RunPage::RunPage(std::filesystem::path folder) : folder_(std::move(folder)) {
 }
 
 void RunPage::show(const Image<std::uint8_t>& picture) {
-  if (picture.empty()) return;
-  char name[24];
-  std::snprintf(name, sizeof name, "scan_%04d.png", ++pictures_);
-  io::write_file(folder_ / name, io::encode_png8(picture));
+  if (!picture.empty()) pictures_.push_back(io::encode_png8(picture));
 }
 
-void RunPage::add(const CycleReport& report) { rows_.push_back({pictures_, report}); }
+void RunPage::add(const CycleReport& report) { rows_.push_back({static_cast<int>(pictures_.size()), report}); }
 
-void RunPage::finish(const WorkCell& cell, const RunEnd& end, const Filling& filling) const {
-  std::string out = kHead;
-  out += "<h1>" + escaped(end.status) + "</h1><p>" + escaped(end.message) + ". " + std::to_string(end.placed) +
-         " parts placed in this run.</p>";
-  out += "<p><img alt=\"the bin as the camera saw it\"><br><button>Play</button> <input type=\"range\" min=\"0\"></p>";
-  if (cell.rack) out += "<h2>Rack</h2>" + rack_table(*cell.rack, filling);
-  out +=
-      "<h2>Cycles</h2><table><tr><th>scan<th>what<th>part<th>slot<th>grasp<th>gripper<th>resort<th>score<th>find "
-      "ms<th>robot s<th></tr>";
-  for (const auto& [picture, report] : rows_) {
-    const bool good = report.state == "placed" || report.state == "put_down" || report.state == "pushed";
-    out += "<tr data-frame=\"" + std::to_string(picture) + "\"" + (good ? "" : " class=\"bad\"") + ">" +
-           cell_of(std::to_string(report.scene)) + cell_of(report.state) + cell_of(report.part) +
-           cell_of(report.slot ? std::to_string(report.slot) : "") + cell_of(report.grasp) + cell_of(report.gripper) +
-           cell_of(report.grasp.empty() ? "" : std::string(name_of(report.resort))) +
-           cell_of(report.grasp.empty() ? "" : number(report.score, 3)) + cell_of(number(report.find_ms, 0)) +
-           cell_of(number(report.robot_s, 1)) + cell_of(report.note) + "</tr>";
+/// One figure a scan: the bin as the camera saw it, and what came of it.
+std::string RunPage::film() const {
+  std::string out = section("film", "Film", "The bin as the camera saw it before each pick, and what came of it.");
+  out += "<div class=\"pics\">";
+  for (std::size_t i = 0; i < rows_.size(); ++i) {
+    const int picture = rows_[i].first;
+    if (picture == 0 || (i > 0 && rows_[i - 1].first == picture)) continue;
+    out += "<figure><img alt=\"the bin, lit from the upper left\" src=\"data:image/png;base64," +
+           report::base64(pictures_[static_cast<std::size_t>(picture) - 1]) + "\"><figcaption>";
+    for (std::size_t k = i; k < rows_.size() && rows_[k].first == picture; ++k)
+      out += (k > i ? "<br>" : "<b>" + std::to_string(rows_[k].second.scene) + "</b> ") +
+             report::state_icon(state_of(rows_[k].second)) + " " + escaped(words_of(rows_[k].second));
+    out += "</figcaption></figure>";
   }
-  out += "</table>";
+  return out + "</div></section>\n";
+}
+
+std::string RunPage::cycles() const {
+  std::string out = section("cycles", "Cycles", "One line for each thing that the robot did, or could not do.");
+  out +=
+      "<div class=\"box\"><table><thead><tr><th class=\"num\">Scan</th><th>What</th><th>Grasp</th>"
+      "<th>Gripper</th><th>Resort</th><th class=\"num\">Score</th><th class=\"num\">Find" +
+      report::unit("ms") + "</th><th class=\"num\">Since the scan" + report::unit("s") +
+      "</th><th>Note</th></tr></thead><tbody>";
+  for (const auto& [picture, row] : rows_) {
+    const bool grasped = !row.grasp.empty();
+    out += "<tr>" + cell(std::to_string(row.scene)) + "<td>" + report::state_icon(state_of(row)) + " " +
+           escaped(words_of(row)) + "</td>" + text_cell(row.grasp) + text_cell(row.gripper) +
+           text_cell(grasped ? words_of(row.resort) : "") + cell(grasped ? number(row.score, 3) : "") +
+           cell(number(row.find_ms, 0)) + cell(number(row.robot_s, 1)) + "<td class=\"wrap\">" + escaped(row.note) +
+           "</td></tr>";
+  }
+  return out + "</tbody></table></div></section>\n";
+}
+
+void RunPage::finish(const WorkCell& cell_file, const RunEnd& end, const Filling& filling) const {
+  int missed = 0, anew = 0, pushed = 0;
   std::map<std::string, int> reasons;
-  for (const auto& row : rows_)
+  for (const auto& row : rows_) {
+    missed += row.second.state == "missed", anew += row.second.state == "put_down",
+        pushed += row.second.state == "pushed";
     for (const grasp::WhyCount& reason : row.second.refused) reasons[std::string(name_of(reason.why))] += reason.count;
-  out += "<h2>Why grasps were refused</h2><table>";
-  for (const auto& [reason, count] : reasons)
-    out += "<tr>" + cell_of(reason) + cell_of(std::to_string(count)) + "</tr>";
-  out += "</table>";
-  io::write_file(folder_ / "index.html", out + kScript + "</html>\n");
+  }
+  const Verdict verdict = verdict_of(end.status);
+  const bool one = end.placed == 1;
+  const std::string first =
+      std::to_string(end.placed) + (one ? " part placed: " : " parts placed: ") + verdict.sentence;
+  std::string lead = escaped(end.message) + ".";
+  if (end.message == verdict.sentence) lead.clear();
+  if (!lead.empty()) lead[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(lead[0])));
+  if (missed + anew + pushed > 0)
+    lead += (lead.empty() ? "" : " ") + std::to_string(missed) + " grips held nothing, " + std::to_string(anew) +
+            " parts were gripped anew at the station, " + std::to_string(pushed) + " were pushed.";
+  std::vector<report::TocEntry> contents = {{"film", "Film"}, {"cycles", "Cycles"}};
+  if (cell_file.rack) contents.insert(contents.begin() + 1, {"rack", "Rack"});
+  if (!reasons.empty()) contents.push_back({"refused", "Why grasps were refused"});
+  const std::string body =
+      film() + (cell_file.rack ? rack_section(cell_file, filling) : "") + cycles() + reasons_section(reasons);
+  io::write_file(folder_ / "index.html", report::page("tribin pick: " + cell_file.file.filename().string(), first, lead,
+                                                      verdict.state, end.status, contents, body));
 }
 
 }  // namespace tribin::picking

@@ -7,6 +7,7 @@
 #include <fstream>
 #include <functional>
 
+#include "report/html.hpp"
 #include "report/palette.hpp"
 #include "report/png.hpp"
 #include "tribin/core/error.hpp"

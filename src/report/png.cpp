@@ -8,6 +8,7 @@
 
 #include "tribin/core/error.hpp"
 #include "tribin/report/label_png.hpp"
+#include "tribin/report/page_kit.hpp"
 
 namespace tribin::report {
 namespace {

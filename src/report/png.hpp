@@ -16,6 +16,4 @@ std::string png_of(const Image<std::uint8_t>& indices, const std::vector<Rgb>& p
 /// 16-bit grey.
 std::string png_of(const Image<std::uint16_t>& grey);
 
-std::string base64(const std::string& bytes);
-
 }  // namespace tribin::report

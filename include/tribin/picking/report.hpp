@@ -19,7 +19,7 @@ std::string line_of(const RunEnd& end, const Filling& filling);
 /// A scan as a small grey picture, lit from the camera's upper left; holes are black.
 Image<std::uint8_t> picture_of(const Scan& scan);
 
-/// A run as a page: a film of its scans with what came of each, the rack, the reasons. Pictures lie beside it.
+/// A run as a page, in one file: a film of its scans with what came of each, the rack, the cycles, the reasons.
 class RunPage {
  public:
   /// \param folder  made where it is missing. \throws Error bad_input where it cannot be written
@@ -28,12 +28,15 @@ class RunPage {
   void show(const Image<std::uint8_t>& picture);
   void add(const CycleReport& report);
   /// Writes index.html.
-  void finish(const WorkCell& cell, const RunEnd& end, const Filling& filling) const;
+  void finish(const WorkCell& cell_file, const RunEnd& end, const Filling& filling) const;
 
  private:
+  std::string film() const;
+  std::string cycles() const;
+
   std::filesystem::path folder_;
-  int pictures_ = 0;
-  std::vector<std::pair<int, CycleReport>> rows_;  ///< number of the picture, what came of it
+  std::vector<std::string> pictures_;              ///< as PNG
+  std::vector<std::pair<int, CycleReport>> rows_;  ///< number of the picture from 1, 0 = none; what came of it
 };
 
 }  // namespace tribin::picking
