@@ -1,6 +1,7 @@
 #include "sim/grip.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 #include <vector>
@@ -30,6 +31,52 @@ struct Contact {
   bool any = false;
   bool through = false;  ///< the part goes on where the jaw is
 };
+
+constexpr double kSpacing_mm = 1;              // of points on what is touched: on a round of 20 mm they miss 0.01 mm
+constexpr double kRim_mm = 1.5 * kSpacing_mm;  // what lies that near to the rim of a pad may be met by it
+constexpr double kTurns_mm = 20;               // how far a part that the jaws align may come between the pads
+
+/// A point of a part's surface, part frame.
+struct SurfacePoint {
+  Vec3f at, normal;
+};
+
+/// Rows of points over a triangle, along its longest side.
+void add_rows(std::array<Vec3, 3> corners, std::vector<SurfacePoint>& out) {
+  const Vec3 cross = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+  if (cross.norm() <= 0) return;
+  const auto side = [&](int k) { return (corners[(k + 1) % 3] - corners[k]).norm(); };
+  const int longest = side(0) >= side(1) && side(0) >= side(2) ? 0 : side(1) >= side(2) ? 1 : 2;
+  std::rotate(corners.begin(), corners.begin() + longest, corners.end());
+  const int rows = static_cast<int>(std::ceil(cross.norm() / side(0) / kSpacing_mm));
+  const Vec3f normal = cross.normalized().cast<float>();
+  for (int row = 0; row <= rows; ++row) {
+    const double up = static_cast<double>(row) / rows;
+    const Vec3 from = corners[0] + up * (corners[2] - corners[0]), to = corners[1] + up * (corners[2] - corners[1]);
+    const int steps = static_cast<int>(std::ceil((to - from).norm() / kSpacing_mm));
+    for (int i = 0; i <= steps; ++i)
+      out.push_back({(from + (to - from) * (static_cast<double>(i) / std::max(1, steps))).cast<float>(), normal});
+  }
+}
+
+/// All of the part that the pads could come near.
+std::vector<SurfacePoint> near_pads(const Mesh& mesh, const Pose& tcp_from_part, const grasp::GripperShape& gripper) {
+  const double round = gripper.stroke_max() / 2 + kInJaw_mm, wide = gripper.pad.width_mm / 2 + kTurns_mm;
+  const Vec3 high(round, gripper.jaws == 2 ? wide : round, gripper.pad.tip_mm + kTurns_mm);
+  const Vec3 low(-high.x(), -high.y(), gripper.pad.tip_mm - gripper.pad.length_mm - kTurns_mm);
+  std::vector<SurfacePoint> out;
+  for (const auto& triangle : mesh.triangles) {
+    std::array<Vec3, 3> corners;
+    Vec3 least = Vec3::Constant(1e30), most = Vec3::Constant(-1e30);
+    for (int k = 0; k < 3; ++k) {
+      corners[k] = mesh.vertices[triangle[k]].cast<double>();
+      const Vec3 p = tcp_from_part * corners[k];
+      least = least.cwiseMin(p), most = most.cwiseMax(p);
+    }
+    if ((least.array() < high.array()).all() && (most.array() > low.array()).all()) add_rows(corners, out);
+  }
+  return out;
+}
 
 /// The flat of a pad, seen along the way of its jaw.
 struct Flat {
@@ -62,21 +109,19 @@ Vec3 rim_normal(const Touch& touch, double height, const std::vector<std::pair<V
 
 /// Where a jaw that comes along -direction (inside: along it) touches first, of what lies between the jaws (inside:
 /// around them). \param direction  unit, from the axis to the jaw
-Contact first_touch(const Solid::State& part, const Pose& tcp_from_part, const grasp::GripperShape& gripper,
-                    double opening_mm, const Vec3& direction) {
+Contact first_touch(const std::vector<SurfacePoint>& part, const Pose& tcp_from_part,
+                    const grasp::GripperShape& gripper, double opening_mm, const Vec3& direction) {
   const Flat flat{gripper.pad, Vec3::UnitZ().cross(direction)};
-  const double sense =
-      gripper.inside ? -1 : 1;  // an outer jaw meets the farthest point first, an inner one the nearest
-  // What lies that near to the rim may be met by it: the shell's spacing, and a half.
-  const double rim_mm = 1.5 * part.diameter / 64;
+  // An outer jaw meets the farthest point first, an inner one the nearest.
+  const double sense = gripper.inside ? -1 : 1;
   Contact contact;
-  std::vector<std::pair<double, const Vec3f*>> met;
+  std::vector<std::pair<double, const SurfacePoint*>> met;
   std::vector<std::pair<Vec3, double>> outside;
   double best = -1e30;
-  for (const Vec3f& point : part.shell.points) {
-    const Vec3 p = tcp_from_part * point.cast<double>();
+  for (const SurfacePoint& point : part) {
+    const Vec3 p = tcp_from_part * point.at.cast<double>();
     const double within = flat.within(p);
-    if (within < -rim_mm) continue;
+    if (within < -kRim_mm) continue;
     const double s = p.dot(direction);
     if (within < 0) {
       if (s > 0) outside.push_back({p, sense * s});
@@ -91,12 +136,10 @@ Contact first_touch(const Solid::State& part, const Pose& tcp_from_part, const g
   std::erase_if(outside, [best](const auto& point) { return point.second < best; });
   for (const auto& [s, point] : met) {
     if (s < best - kSeat_mm) continue;
-    Touch touch{tcp_from_part * point->cast<double>(), direction};
-    if (flat.within(touch.at) <= rim_mm) {  // farther in, the flat meets it whatever the part is like there
-      Vec3f normal;
-      part.field.at(*point, normal);
-      touch.normal = sense * (tcp_from_part.linear() * normal.cast<double>());
-      touch.normal = rim_normal(touch, s, outside, rim_mm, direction);
+    Touch touch{tcp_from_part * point->at.cast<double>(), direction};
+    if (flat.within(touch.at) <= kRim_mm) {  // farther in, the flat meets it whatever the part is like there
+      touch.normal = sense * (tcp_from_part.linear() * point->normal.cast<double>());
+      touch.normal = rim_normal(touch, s, outside, kRim_mm, direction);
     }
     contact.touches.push_back(touch);
   }
@@ -113,7 +156,7 @@ struct Closed {
   double mean = 0;  ///< of their ways from the axis
   bool all = true, any = false;
 };
-Closed close_on(const grasp::GripperShape& gripper, double opening_mm, const Solid::State& part,
+Closed close_on(const grasp::GripperShape& gripper, double opening_mm, const std::vector<SurfacePoint>& part,
                 const Pose& tcp_from_part) {
   Closed closed;
   for (int k = 0; k < gripper.jaws; ++k) {
@@ -148,8 +191,8 @@ bool is_steady(const Closed& closed, double cone) {
 
 /// Two outer jaws press a part that friction does not hold, and it turns about the tool and about the jaws' height as
 /// that lets them close, until friction holds it or it can turn no further.
-Pose aligned(const grasp::GripperShape& gripper, double opening_mm, const Solid::State& part, Pose tcp_from_part,
-             double cone) {
+Pose aligned(const grasp::GripperShape& gripper, double opening_mm, const std::vector<SurfacePoint>& part,
+             Pose tcp_from_part, double cone) {
   constexpr double kSteps[] = {0.5 * kDegree, 0.1 * kDegree};
   constexpr int kMostSteps = 40;     // of each size: beyond 20 deg it is another grasp
   constexpr double kGain_mm = 0.02;  // less is the spacing of the points
@@ -176,8 +219,9 @@ Pose aligned(const grasp::GripperShape& gripper, double opening_mm, const Solid:
   return tcp_from_part;
 }
 
-Grip close_jaws(const grasp::GripperShape& gripper, double opening_mm, const Solid::State& part,
+Grip close_jaws(const grasp::GripperShape& gripper, double opening_mm, const Solid::State& solid,
                 const Pose& tcp_from_part, double friction, double mass_kg) {
+  const std::vector<SurfacePoint> part = near_pads(*solid.mesh, tcp_from_part, gripper);
   Grip grip;
   const auto refuse = [&grip](const char* why) {
     grip.why = why;

@@ -72,6 +72,24 @@ std::string about_miss(const sim::CellTruth& truth, const picking::CycleReport& 
   return text + (truth.failed_grips.empty() ? std::string() : truth.failed_grips.back());
 }
 
+/// Where a part that is left lies: its box in the bin's frame, the room to the walls, the part's axes that look up.
+std::string about_left(const WorkCell& cell, const sim::PartTruth& part, const Part& model) {
+  const Pose bin_from_part = cell.bin->base_from_bin.inverse() * part.base_from_part;
+  Vec3 low = Vec3::Constant(1e9), high = Vec3::Constant(-1e9);
+  for (const Vec3f& v : model.mesh.vertices) {
+    const Vec3 p = bin_from_part * v.cast<double>();
+    low = low.cwiseMin(p), high = high.cwiseMax(p);
+  }
+  const Vec3 half = cell.bin->inner_size_mm / 2;
+  char text[200];
+  std::snprintf(text, sizeof text,
+                "%s: %.0f x %.0f x %.0f mm, room to the walls %.0f %.0f %.0f %.0f mm, up (%.2f %.2f %.2f)",
+                part.part.c_str(), high.x() - low.x(), high.y() - low.y(), high.z() - low.z(), half.x() + low.x(),
+                half.x() - high.x(), half.y() + low.y(), half.y() - high.y(), bin_from_part.linear()(2, 0),
+                bin_from_part.linear()(2, 1), bin_from_part.linear()(2, 2));
+  return text;
+}
+
 void print(const char* name, const std::map<std::string, int>& counts) {
   std::printf("%s:", name);
   for (const auto& [what, count] : counts) std::printf(" %s %d;", what.c_str(), count);
@@ -142,10 +160,11 @@ int main(int argc, char** argv) try {
       totals.plan_ms.push_back(report.plan_ms);
       for (const auto& reason : report.refused) totals.refused[std::string(name_of(reason.why))] += reason.count;
       if (verbose)
-        std::printf("    scene %d %s %s %s (%s) slot %d resort %s score %.3f find %.0f ms plan %.0f ms %.1f s %s\n",
-                    report.scene, report.state.c_str(), report.part.c_str(), report.grasp.c_str(),
-                    report.gripper.c_str(), report.slot, std::string(name_of(report.resort)).c_str(), report.score,
-                    report.find_ms, report.plan_ms, report.robot_s, report.note.c_str());
+        std::printf(
+            "    scene %d cycle %d %s %s %s (%s) slot %d resort %s score %.3f find %.0f ms plan %.0f ms %.1f s %s\n",
+            report.scene, report.cycle, report.state.c_str(), report.part.c_str(), report.grasp.c_str(),
+            report.gripper.c_str(), report.slot, std::string(name_of(report.resort)).c_str(), report.score,
+            report.find_ms, report.plan_ms, report.robot_s, report.note.c_str());
       if (verbose && report.state == "missed")
         std::printf("      %s\n", about_miss(simulated.truth(), report, vision->model(report.part)).c_str());
       std::fflush(stdout);
@@ -186,6 +205,10 @@ int main(int argc, char** argv) try {
         if (part.where == sim::Whereabouts::placed)
           std::printf("    %s in slot %d: %.2f mm, %.2f deg off\n", part.part.c_str(), part.slot, part.off_mm,
                       part.off_rad / kDegree);
+    if (verbose)
+      for (const sim::PartTruth& part : truth.parts)
+        if (part.where == sim::Whereabouts::in_bin)
+          std::printf("    left %s\n", about_left(cell, part, vision->model(part.part)).c_str());
     if (verbose)
       for (const sim::CellCollision& c : truth.collisions)
         std::printf("    collision at %.1f s, cycle %d: %s, %.2f mm\n", c.time_s, c.cycle, c.what.c_str(), c.depth_mm);

@@ -31,7 +31,8 @@ TEST(Grip, PlannedGraspsHoldAndLeaveThePartWhereItIs) {
     const grasp::GraspPart known = grasp::prepare_grasps(part, in_cell, cell.grippers);
     Random random(1);
     int count = 0, held = 0, still = 0;
-    for (const grasp::Candidate& candidate : known.candidates) {
+    for (std::size_t i = 0; i < known.candidates.size(); i += 4) {
+      const grasp::Candidate& candidate = known.candidates[i];
       const grasp::GripperShape& gripper = known.grippers[candidate.gripper];
       const Pose planned = candidate.part_from_tcp.inverse();
       const Pose tcp_from_part = drawn_motion(kPlace_mm, kTurn, random) * planned;
@@ -45,9 +46,9 @@ TEST(Grip, PlannedGraspsHoldAndLeaveThePartWhereItIs) {
       still += grip.holds && std::abs((now.translation() - planned.translation()).x()) < 1 &&
                rotation_angle(now.linear(), planned.linear()) < 5 * kTurn;
     }
-    EXPECT_GT(count, 500);
-    EXPECT_GE(held, 0.985 * count) << count;
-    EXPECT_GE(still, 0.97 * count) << count;
+    EXPECT_GT(count, 200);
+    EXPECT_GE(held, 0.99 * count) << count;
+    EXPECT_GE(still, 0.98 * count) << count;
   }
 }
 
