@@ -25,6 +25,7 @@ struct Attempt {
   const DepthSpace* around = nullptr;  ///< what was seen without the part itself; none where there is no scan
   Pose base_from_tcp = Pose::Identity();
   double tilt = 0, max_tilt = 0;  ///< [rad]
+  double wider_mm = 0;            ///< a side, by which the jaws are to open farther than errors ask for
   double opening_before_mm = 0;
   double sigma_mm = 0, room_mm = 0;  ///< along the closing direction; what the jaws leave a side
   double hold = 1e300;               ///< force against weight

@@ -42,7 +42,8 @@ Checked check_hold(const SceneFacts& facts, Attempt& a) {
   return {};
 }
 
-/// Jaws open by 3 sigma of the place and the clearance a side, as far as their stroke goes.
+/// Jaws open by 3 sigma of the place and the clearance a side, and by what is asked beyond, as far as their stroke
+/// goes.
 Checked check_opening(const SceneFacts& facts, Attempt& a) {
   const PartHere& here = facts.scene->parts[a.part];
   const Matrix3& r = a.base_from_tcp.linear();
@@ -55,7 +56,7 @@ Checked check_opening(const SceneFacts& facts, Attempt& a) {
   } else {
     const double at = a.candidate->opening_mm, low = a.gripper->stroke_min(), high = a.gripper->stroke_max();
     if (at < low || at > high) return Refusal{Why::stroke, at, at < low ? low : high};
-    const double wanted = std::hypot(3 * a.sigma_mm, facts.options->clearance_mm);
+    const double wanted = std::hypot(3 * a.sigma_mm, facts.options->clearance_mm) + a.wider_mm;
     a.room_mm = std::min(wanted, (a.gripper->inside ? at - low : high - at) / 2);
     a.opening_before_mm = a.gripper->inside ? at - 2 * a.room_mm : at + 2 * a.room_mm;
   }

@@ -93,16 +93,39 @@ class GripperPlan {
     return order;
   }
 
-  /// From which side, and how steeply, a tool comes: upright, or one of eight sides by steps of 15 deg.
-  static std::string from_where(const Attempt& a) {
+  /// From which side of the bin, and how steeply, a tool comes: upright, or one of eight sides by steps of 15 deg.
+  std::string from_where(const Attempt& a) const {
     const int steep = static_cast<int>(a.tilt / (15 * kDegree) + 0.5);
     if (steep == 0) return " upright";
-    const Vec3 in = a.base_from_tcp.linear().col(2);
+    Vec3 in = a.base_from_tcp.linear().col(2);
+    if (facts_.scene->bin) in = facts_.scene->bin->base_from_bin.linear().transpose() * in;
     return " " + std::to_string(steep) + " " + std::to_string(std::lround(std::atan2(in.y(), in.x()) / (kPi / 4)) & 7);
   }
 
-  /// As it is, and where the arm refuses, turned to the other side of equal jaws.
+  /// As it is; where something lies beside the part, or its own shadow hides what does, with the jaws opened wider:
+  /// they come down farther out, where it is lower, and close on the part.
   bool look_closely(const Attempt& fits) {
+    constexpr double kWider_mm[] = {0, 5, 12};
+    std::optional<Refusal> first;
+    double room = -1;
+    for (const double wider : kWider_mm) {
+      Attempt a = fits;
+      if (wider > 0) {
+        if (gripper_.jaws == 0 || (first->why != Why::scan && first->why != Why::part)) break;
+        a.wider_mm = wider;
+        if (judge_place(facts_, a) || a.room_mm <= room || judge_walls(facts_, a)) break;
+      }
+      room = a.room_mm;
+      const auto refusal = look_from_both_sides(a);
+      if (!refusal) return true;
+      if (!first) first = refusal;
+    }
+    refuse(fits, *first);
+    return false;
+  }
+
+  /// As it is, and where the arm refuses, turned to the other side of equal jaws. \return why not
+  Checked look_from_both_sides(const Attempt& fits) {
     const int turns = gripper_.jaws == 0 ? 1 : gripper_.jaws;
     std::optional<Refusal> first;
     for (int k = 0; k < turns; ++k) {
@@ -114,14 +137,13 @@ class GripperPlan {
       if (!refusal) refusal = judge_way(facts_, a);
       if (!refusal) {
         out_.grasps.push_back(scored(facts_, a));
-        return true;
+        return {};
       }
       if (!first) first = refusal;
       const Why why = refusal->why;
       if (why != Why::reach && why != Why::form && why < Why::arm_bin) break;
     }
-    refuse(fits, *first);
-    return false;
+    return first;
   }
 
   const SceneFacts& facts_;

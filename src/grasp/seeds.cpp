@@ -179,7 +179,7 @@ class Seeder {
     for (const Primitive* p : largest(part_, {PrimitiveType::plane}, false)) {
       Vec3 u, v;
       orthonormal_basis(p->axis, u, v);
-      for (const Vec3& at : places_on(*p, std::max(pad_.width_mm / 2, 8.0), 3)) {
+      for (const Vec3& at : places_on(*p, std::max(pad_.width_mm / 2, 8.0), 4)) {
         const Vec3 through = slots ? p->axis : Vec3(-p->axis);
         constexpr double kOff_mm = 0.01;  // from the face itself
         const auto hit = tree_.first_hit(at + kOff_mm * through, through, gripper_.stroke_max());

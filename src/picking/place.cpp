@@ -5,7 +5,7 @@
 namespace tribin::picking {
 namespace {
 
-constexpr double kAbove_mm = 100;           // a part is lowered into its slot from there
+constexpr double kAbove_mm = 100;           // a part is lowered into its slot from there, the tool goes back at least
 constexpr double kClear_mm = 2;             // gripper and what stands in the rack: a robot's error, three times
 constexpr double kPartClear_mm = 0.5;       // of parts: how close they stand is the rack's business
 constexpr double kMostTurn = 10 * kDegree;  // of a tool that points up, from the level: nothing is placed from below
@@ -29,6 +29,17 @@ bool clear_of(const grasp::Convex& body, std::span<const grasp::Convex> others, 
 Pose shifted(Pose pose, const Vec3& by) {
   pose.translation() += by;
   return pose;
+}
+
+/// How far a tool goes back along itself until it stands before all of the part that it let go: what it does then, a
+/// turn or another tool, cannot touch it.
+double way_back_mm(const Held& held, const Pose& base_from_tcp, const Pose& base_from_part) {
+  const Vec3 tool = base_from_tcp.linear().col(2);
+  double tips = -1e300;
+  for (const grasp::Convex& piece : grasp::pieces_at(*held.gripper, held.opening_mm))
+    tips = std::max(tips, grasp::reach_along(grasp::moved(base_from_tcp, piece), tool));
+  const double front = -grasp::reach_along(box_of(*held.part, base_from_part), -tool);
+  return std::max(kAbove_mm, tips - front + kClear_mm);
 }
 
 bool is_clear(const Held& held, const std::array<Pose, 3>& tcp, const Pose& base_from_slot, const Pose& base_from_part,
@@ -83,7 +94,8 @@ std::optional<Placing> plan_place(const ArmWithTool& arm, const Held& held, std:
       const Pose base_from_part = slot->base_from_slot * stands, at = base_from_part * part_from_tcp;
       const Vec3 up = slot->base_from_slot.linear().col(2), tool = at.linear().col(2);
       if (tool.dot(up) > std::sin(kMostTurn)) continue;
-      const std::array<Pose, 3> tcp = {shifted(at, kAbove_mm * up), at, shifted(at, -kAbove_mm * tool)};
+      const std::array<Pose, 3> tcp = {shifted(at, kAbove_mm * up), at,
+                                       shifted(at, -way_back_mm(held, at, base_from_part) * tool)};
       if (!is_clear(held, tcp, slot->base_from_slot, base_from_part, boxes)) continue;
       const auto stops = stops_at(arm, tcp);
       if (!stops) continue;

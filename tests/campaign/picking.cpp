@@ -194,6 +194,10 @@ int main(int argc, char** argv) try {
         ++why["part " + std::to_string(refused.part) + " " + refused.gripper][std::string(name_of(refused.why))];
       for (const auto& [who, counts] : why) print(("    left: " + who).c_str(), counts);
       std::printf("    left: %zu grasps that lead to no place\n", plan.grasps.size());
+      std::map<std::string, int> pushes;
+      for (const auto& reason : vision->plan_pushes(all).reasons)
+        pushes[std::string(name_of(reason.why))] = reason.count;
+      print("    left: pushes refused", pushes);
     }
     int placed = 0;
     for (const sim::PartTruth& part : truth.parts) placed += part.where == sim::Whereabouts::placed;
