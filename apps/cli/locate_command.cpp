@@ -75,6 +75,8 @@ void print_table(const Scan& scan, std::span<const Part> parts, const Found& fou
     for (const Alternative& other : instance.alternatives)
       std::printf("  or, with probability %.2f, another pose of it; decided by %s\n", other.probability,
                   other.decided_by.c_str());
+    if (instance.quality.decision == QualityDecision::deviates)
+      for (const std::string& reason : instance.quality.reasons) std::printf("  deviates: %s\n", reason.c_str());
   }
   if (judged && judged->found.size() < truth->truths.size())
     std::printf("%zu of %zu parts that are really there were not found.\n", judged->missed.size(),

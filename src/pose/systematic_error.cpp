@@ -1,30 +1,16 @@
 #include "tribin/pose/systematic_error.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <optional>
 
 #include "inside_silhouette.hpp"
+#include "tribin/pose/systematic_terms.hpp"
 
 namespace tribin {
 namespace {
 
-constexpr int kTerms = 7;  // 1, x, y, xx, xy, yy of the relative error; a common offset
-
-using Response = Eigen::Matrix<double, 6, kTerms>;
-
-/// sd of the coefficients. A quadratic with six equal ones has mean square 1 + 1/3 + 1/3 + 1/5 + 1/9 + 1/5 of theirs
-/// over the image.
-Eigen::Matrix<double, kTerms, 1> variances(const NoiseProfile& noise) {
-  constexpr double kMeanSquare = 1 + 2.0 / 3 + 2.0 / 5 + 1.0 / 9;
-  Eigen::Matrix<double, kTerms, 1> v;
-  v.setConstant(noise.shape_error * noise.shape_error / kMeanSquare);
-  v[0] += noise.scale_error * noise.scale_error;
-  v[kTerms - 1] = noise.offset_mm * noise.offset_mm;
-  return v;
-}
-
+using Response = Eigen::Matrix<double, 6, kSystematicTerms>;
 using Vec6 = Eigen::Matrix<double, 6, 1>;
 
 /// A pixel that holds the pose: those of the information, no others. One more face would pull where nothing else holds.
@@ -65,7 +51,7 @@ double independent_share(const IndexRender& render, const SceneDepth& scene) {
 
 Matrix6 pull_of_systematic_errors(const IndexRender& render, const SceneDepth& scene, const NoiseProfile& noise,
                                   const Vec3& center, double cad_sigma_mm) {
-  const Eigen::Matrix<double, kTerms, 1> variance = variances(noise);
+  const SystematicVariances variance = systematic_variances(noise);
   if (variance.isZero()) return Matrix6::Zero();
   const PinholeCamera& camera = scene.camera;
   Response response = Response::Zero();
@@ -73,10 +59,8 @@ Matrix6 pull_of_systematic_errors(const IndexRender& render, const SceneDepth& s
     for (int i = 0; i < render.width; ++i) {
       const auto pixel = holding_pixel(render, scene, center, cad_sigma_mm, i, j);
       if (!pixel) continue;
-      const double x = 2.0 * (render.u0 + i * render.step) / camera.width - 1,
-                   y = 2.0 * (render.v0 + j * render.step) / camera.height - 1, z = pixel->z;
-      const std::array<double, kTerms> terms = {z, z * x, z * y, z * x * x, z * x * y, z * y * y, 1};
-      for (int t = 0; t < kTerms; ++t)
+      const auto terms = systematic_terms(camera, render.u0 + i * render.step, render.v0 + j * render.step, pixel->z);
+      for (int t = 0; t < kSystematicTerms; ++t)
         response.col(t) += pixel->jacobian * (pixel->along * terms[static_cast<std::size_t>(t)] / pixel->variance);
     }
   response *= independent_share(render, scene);

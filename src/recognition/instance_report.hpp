@@ -16,7 +16,9 @@ std::vector<Vector6> free_directions_about_center(const Part& part, const Pose& 
 void describe_uncertainty(const Part& part, const Matrix6& systematic_pull, const Matrix6& patch_pull,
                           const Refinement& refinement, Instance& instance);
 
-/// Fills evidence: each primitive of the part that enough pixels show, measured without its nominal value.
-void describe_evidence(const Part& part, const SceneDepth& scene, const SceneFeatures& features, Instance& instance);
+/// Fills evidence and quality of all that was found: each primitive that enough pixels show measured free of its
+/// nominal value, the dimensions between them, the surface point by point.
+void describe_quality(std::span<const Part> parts, const SceneDepth& scene, const SceneFeatures& features,
+                      const NoiseProfile& noise, Instances& found);
 
 }  // namespace tribin

@@ -70,8 +70,7 @@ double share_of_first(const Instance& instance) {
 }
 
 Instance make_instance(const Polished& p, std::span<const Part> parts, const SceneDepth& scene,
-                       const SceneFeatures& features, const NoiseProfile& noise,
-                       const RecognitionOptions& recognition) {
+                       const NoiseProfile& noise, const RecognitionOptions& recognition) {
   const Part& part = parts[static_cast<std::size_t>(p.candidate.part)];
   Instance out;
   out.part = part.name;
@@ -92,7 +91,6 @@ Instance make_instance(const Polished& p, std::span<const Part> parts, const Sce
   const Matrix6 pull = pull_of_systematic_errors(render, scene, noise, center, options.cad_sigma_mm);
   const Matrix6 patches = pull_of_patches(render, scene, center, options.cad_sigma_mm);
   describe_uncertainty(part, pull, patches, refined, out);
-  describe_evidence(part, scene, features, out);
 
   // Self-similar poses: those that keep 1 % are told.
   double sum = 1;
@@ -338,7 +336,7 @@ Instances recognize(const Primitives& primitives, const PrimitiveModel& observat
   decide_together(scene, parts, found);
   CellMask told;  // cells of the parts that are told of; what is kept back explains nothing
   for (const Polished& p : found) {
-    Instance instance = make_instance(p, parts, scene, features, surfels.scan->noise, options);
+    Instance instance = make_instance(p, parts, scene, surfels.scan->noise, options);
     const auto kept_back = [&](const char* test, double value, double limit) {
       add_reason(out.rejected, {instance.part, "acceptance", test, value, limit, 1,
                                 place_of(parts[static_cast<std::size_t>(p.candidate.part)], p.candidate)});
@@ -365,6 +363,7 @@ Instances recognize(const Primitives& primitives, const PrimitiveModel& observat
     for (Instance& instance : *list) instance.id = ++id;
   }
   name_neighbours(parts, out);
+  describe_quality(parts, scene, features, surfels.scan->noise, out);
   out.unexplained = unexplained_regions(features, parts, told, options.bin, in_bin);
   return out;
 }

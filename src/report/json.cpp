@@ -32,6 +32,40 @@ Json evidence_json(const Evidence& e) {
   return out;
 }
 
+/// Lengths in mm, angles in degrees: the keys say which.
+Json dimension_json(const Dimension& d) {
+  const double unit = d.is_angle ? kDegree : 1;
+  const std::string suffix = d.is_angle ? "_deg" : "_mm";
+  Json out = {{"name", d.name}, {"kind", d.kind}, {"cad_primitives", Json::array({d.first})}};
+  if (d.second > 0) out["cad_primitives"].push_back(d.second);
+  out["nominal" + suffix] = json::rounded(d.nominal / unit, 5);
+  out["measured" + suffix] = json::rounded(d.measured / unit, 5);
+  out["sigma" + suffix] = json::significant(d.sigma / unit);
+  out["tolerance" + suffix] = json::rounded(d.tolerance / unit, 5);
+  out["deviates"] = d.deviates;
+  return out;
+}
+
+Json quality_json(const Quality& quality) {
+  Json out = {{"decision", name_of(quality.decision)},
+              {"reasons", Json::array()},
+              {"checked_fraction", json::rounded(quality.checked_fraction, 4)},
+              {"dimensions", Json::array()},
+              {"deviations", Json::array()}};
+  for (const std::string& reason : quality.reasons) out["reasons"].push_back(reason);
+  for (const Dimension& d : quality.dimensions) out["dimensions"].push_back(dimension_json(d));
+  for (const Deviation& d : quality.deviations) {
+    Json entry = {{"kind", d.kind}};
+    if (d.primitive > 0) entry["cad_primitive"] = d.primitive;
+    entry["at_part_mm"] = json::millimetres(d.at_part_mm);
+    entry["area_mm2"] = json::rounded(d.area_mm2, 1);
+    entry["depth_mm"] = json::rounded(d.depth_mm, 4);
+    entry["sigma_mm"] = json::significant(d.sigma_mm);
+    out["deviations"].push_back(entry);
+  }
+  return out;
+}
+
 Json direction_json(const Vector6& direction) {
   Json out = Json::array();
   for (int i = 0; i < 6; ++i) out.push_back(json::rounded(direction[i], 9));
@@ -68,6 +102,7 @@ Json instance_json(const Instance& instance, const Pose& input_from_camera) {
   }
   out["evidence"] = Json::array();
   for (const Evidence& evidence : instance.evidence) out["evidence"].push_back(evidence_json(evidence));
+  out["quality"] = quality_json(instance.quality);
   return out;
 }
 

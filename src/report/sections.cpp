@@ -160,6 +160,23 @@ std::string evidence_row(const Evidence& e, int part_class, Beyond& beyond) {
   return out + "</td></tr>";
 }
 
+/// The decision on a part's quality with its reasons; the dimensions stand in the JSON.
+std::string quality_lines(const Quality& quality) {
+  std::string decision = name_of(quality.decision);
+  std::replace(decision.begin(), decision.end(), '_', ' ');
+  const bool bad = quality.decision == QualityDecision::deviates;
+  std::string out = std::string("<p") + (bad ? " class=\"bad-text\"" : "") + ">Quality: <b>" + decision + "</b>, " +
+                    std::to_string(quality.dimensions.size()) + " dimensions and " +
+                    number(100 * quality.checked_fraction, 0) + " % of the silhouette compared.</p>";
+  if (quality.reasons.empty()) return out;
+  constexpr std::size_t kMost = 6;  // one fault moves many dimensions; the JSON has them all
+  out += "<ul>";
+  for (std::size_t i = 0; i < quality.reasons.size() && i < kMost; ++i)
+    out += "<li>" + escaped(quality.reasons[i]) + "</li>";
+  if (quality.reasons.size() > kMost) out += "<li>and " + std::to_string(quality.reasons.size() - kMost) + " more</li>";
+  return out + "</ul>";
+}
+
 }  // namespace
 
 std::string evidence_section(std::span<const Part> parts, const Found& found) {
@@ -175,6 +192,7 @@ std::string evidence_section(std::span<const Part> parts, const Found& found) {
     const int part_class = std::max(0, class_of(parts, instance.part));
     tables +=
         "<div><h3>" + class_tag(part_class) + escaped(instance.part) + " " + std::to_string(instance.id) + "</h3>";
+    tables += quality_lines(instance.quality);
     const std::vector<std::string> columns = {
         "Primitive" + unit("mm"), "Nominal", "Measured", "σ", "Difference", "Arc", "rms"};
     tables += head(columns, 1);

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "tribin/core/reason.hpp"
+#include "tribin/recognition/quality.hpp"
 #include "tribin/segmentation/primitives.hpp"
 
 namespace tribin {
@@ -43,7 +44,7 @@ struct Evidence {
   int inliers = 0;         ///< pixels
   double rms_mm = 0;
   std::optional<double> radius_nominal_mm, radius_measured_mm, radius_sigma_mm;
-  std::optional<double> offset_mm, offset_sigma_mm;  ///< planes: measured minus nominal place along the normal
+  std::optional<double> offset_mm, offset_sigma_mm;  ///< planes, cones: measured minus nominal place along the normal
   std::vector<TestResult> tests;                     ///< where the method judges by named tests (paper_method)
 };
 
@@ -62,6 +63,7 @@ struct Instance {
   std::vector<Pose> equivalent_poses;
   std::vector<Alternative> alternatives;
   std::vector<Evidence> evidence;
+  Quality quality;
 };
 
 /// A connected piece of the scan that neither a part nor the background explains, and that is large enough to be a
