@@ -22,6 +22,7 @@ target_include_directories(campaign_simulator PRIVATE ${PROJECT_SOURCE_DIR}/src)
 if(TARGET campaign_picking)
   target_compile_definitions(campaign_picking PRIVATE TRIBIN_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
 endif()
+target_compile_definitions(campaign_elbows PRIVATE TRIBIN_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
 if(TARGET campaign_kill_nine)
   target_compile_definitions(campaign_kill_nine PRIVATE TRIBIN_SOURCE_DIR="${PROJECT_SOURCE_DIR}"
                                                         TRIBIN_KILL_CHILD="$<TARGET_FILE:kill_child>")

@@ -4,6 +4,7 @@
 
 #include "io/cloud_camera.hpp"
 #include "io/depth_image.hpp"
+#include "io/lattice.hpp"
 #include "io/raw_cloud.hpp"
 #include "tribin/core/parallel.hpp"
 #include "tribin/io/camera_file.hpp"
@@ -151,6 +152,7 @@ double cloud_unit(const RawCloud& cloud, LengthUnit unit, std::vector<std::strin
 
 Scan scan_from_cloud(RawCloud cloud, const ScanReadOptions& options) {
   if (!cloud.organized()) {
+    if (auto regained = regain_grid(cloud)) return scan_from_cloud(std::move(*regained), options);
     bad_file(cloud.name, "", std::to_string(cloud.points.size()) + " loose points",
              "an organized scan (a grid of width x height)", ErrorCode::too_little_data);
   }
