@@ -19,3 +19,20 @@ if(TRIBIN_PYTHON)
 endif()
 tribin_check(clang_format tools/check_format "${TRIBIN_CLANG_FORMAT}")
 tribin_check(consumer tests/consumer/run ${PROJECT_SOURCE_DIR} ${PROJECT_BINARY_DIR})
+
+# The loops that are built for several levels of vectors, built for one each: objects of a program go before those of
+# the library. The levels must give the same bytes.
+if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64" AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+  set(vectorised src/capture/fringe_lanes.cpp src/capture/ideal_view.cpp src/pose/raster.cpp
+                 src/segmentation/normal_equations.cpp src/surfel/quadrics.cpp)
+  list(TRANSFORM vectorised PREPEND ${PROJECT_SOURCE_DIR}/)
+  set(levels)
+  foreach(level sse2 avx2 avx512f)
+    add_executable(at_${level} simd/at_level.cpp ${vectorised})
+    target_link_libraries(at_${level} PRIVATE tribin::tribin GTest::gtest)
+    target_include_directories(at_${level} PRIVATE ${PROJECT_SOURCE_DIR}/src ${CMAKE_CURRENT_SOURCE_DIR})
+    target_compile_definitions(at_${level} PRIVATE TRIBIN_ONE_LEVEL="${level}" TRIBIN_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
+    list(APPEND levels $<TARGET_FILE:at_${level}>)
+  endforeach()
+  tribin_check(simd_levels tests/simd/compare ${levels})
+endif()
