@@ -129,6 +129,7 @@ class Guard {
   Guard(std::unique_ptr<robot::Controller> controller, Cell& cell, const robot::SafetyLimits& limits, bool threads) {
     const auto kept_back = [](const std::string& what) { log(LogLevel::warning, what); };
     clock_ = cell.clock;
+    moves_to_look_ = cell.cell.mount() == CameraMount::hand;
     if (!threads) {  // the simulated cell lives on one thread; the cycle looks at the status itself
       guarded_ = make_guarded(std::move(controller), limits, true, kept_back);
       return;
@@ -153,7 +154,8 @@ class Guard {
         phase == picking::Phase::regrasp)
       scan_s_ = clock_->now_s();
     const bool moves = phase == picking::Phase::pick || phase == picking::Phase::place ||
-                       phase == picking::Phase::regrasp || phase == picking::Phase::push;
+                       phase == picking::Phase::regrasp || phase == picking::Phase::push ||
+                       (phase == picking::Phase::scan && moves_to_look_);
     if (watchdog_) watchdog_->watch(moves);
   }
 
@@ -174,6 +176,7 @@ class Guard {
   }
 
   robot::Clock* clock_ = nullptr;
+  bool moves_to_look_ = false;  // the camera is on the flange
   std::atomic<double> heard_s_{0}, scan_s_{0};
   std::unique_ptr<robot::Controller> guarded_;
   std::unique_ptr<robot::Watchdog> watchdog_;  // ends before the controller does
@@ -222,7 +225,16 @@ picking::Filling known_filling(const Options& options, std::size_t slots) {
 int dry_run(Cell& cell, picking::Vision& vision, const Options& options) {
   const picking::Filling filling =
       known_filling(options, cell.cell.rack ? picking::slots_of(*cell.cell.rack).size() : 0);
-  const picking::CycleReport report = plan_first(cell.cell, cell.robot, vision, filling, limits_for(cell, options));
+  // A camera on the flange looks from where that stands: asked of the controller, unless the record tells it.
+  picking::FlangePose flange;
+  if (cell.cell.mount() == CameraMount::hand)
+    flange = [&cell] {
+      const robot::CartesianPosition at = connect(cell)->position();
+      const auto tool = std::clamp<std::size_t>(static_cast<std::size_t>(at.tool), 1, cell.cell.grippers.size()) - 1;
+      return Pose(robot::pose_of(at) * cell.cell.grippers[tool].flange_from_tcp.inverse());
+    };
+  const picking::CycleReport report =
+      plan_first(cell.cell, cell.robot, vision, filling, limits_for(cell, options), flange);
   Lines(options.json).write(line_of(report));
   if (!options.report.empty()) {
     picking::RunPage page(options.report);

@@ -108,8 +108,12 @@ Fields<CellCamera> camera_fields() {
   fields.file("file", &CellCamera::file, "camera file: intrinsics and noise").required();
   fields.choice("mount", {{"fixed", CameraMount::fixed}, {"hand", CameraMount::hand}}, &CellCamera::mount,
                 "fixed: it stands in the cell; hand: it is on the flange");
-  return fields.number("keep_out_mm", "mm", {0, kLargest}, &CellCamera::keep_out_mm,
-                       "radius of a ball about its optical centre that its body fills; 0 = not said");
+  fields.number("keep_out_mm", "mm", {0, kLargest}, &CellCamera::keep_out_mm,
+                "radius of a ball about its optical centre that its body fills; 0 = not said");
+  return fields.value("looks", "", "at most 6 poses", "[]", &CellCamera::looks,
+                      "on the flange: where that stands in the base for a scan; the first always, the others when "
+                      "nothing can be picked",
+                      read_way_points);
 }
 
 Fields<HandEyeKeys> hand_eye_fields() {

@@ -43,6 +43,7 @@ Chooser::Chooser(const WorkCell& cell, const robot::RobotModel& robot, Vision& v
   want(!cell.parts.empty(), "[[part]]");
   want(!cell.robots.empty(), "[[robot]]");
   want(cell.safety.workspace_mm.has_value(), "safety.workspace_mm");
+  want(cell.mount() == CameraMount::fixed || !cell.camera->looks.empty(), "camera.looks");
   slots_ = slots_of(*cell.rack);
   for (const Gripper& gripper : cell.grippers) shapes_.push_back(grasp::gripper_shape(gripper));
 }

@@ -20,7 +20,7 @@ std::string_view name_of(Phase phase) {
 }
 
 std::string_view name_of(Resort resort) {
-  constexpr std::string_view kNames[] = {"none", "next_gripper", "full_tilt", "push"};
+  constexpr std::string_view kNames[] = {"none", "next_gripper", "full_tilt", "next_look", "push"};
   return kNames[static_cast<int>(resort)];
 }
 
@@ -116,8 +116,9 @@ Phase Run::scan() {
   if (options_.most_parts > 0 && end_.placed >= options_.most_parts)
     return finish("most_parts", std::to_string(end_.placed) + " parts are placed, as many as were asked for");
   scene_ = std::max(scene_, now().last_scene) + 1;
+  const FlangePose flange = go_to_look();
   scan_s_ = links_.clock->now_s();
-  sight_ = links_.vision->scan();
+  sight_ = links_.vision->scan(flange);
   report_ = {};
   report_.find_ms = sight_.find_ms;
   report_.seen = sight_.seen;
@@ -173,7 +174,7 @@ Phase Run::pick() {
   turns_ = 0;
   const bool held = carry_out_pick(choice, scene_, false);
   if (held) {
-    failures_ = pushes_ = 0;
+    failures_ = pushes_ = look_ = 0;
     resort_ = Resort::none;
     return Phase::place;
   }

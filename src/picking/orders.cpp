@@ -8,10 +8,7 @@ namespace tribin::picking {
 
 const Chooser::Start& Run::here() {
   if (!here_) {
-    const robot::CartesianPosition at = links_.controller->position();
-    const auto& grippers = links_.cell->grippers;
-    const auto tool = static_cast<std::size_t>(std::clamp(at.tool, 1, static_cast<int>(grippers.size())) - 1);
-    here_ = Chooser::Start{robot::pose_of(at) * grippers[tool].flange_from_tcp.inverse(), {}};
+    here_ = Chooser::Start{robot::pose_of(links_.controller->position()) * gripper_now().flange_from_tcp.inverse(), {}};
   }
   return *here_;
 }
@@ -55,7 +52,30 @@ void Run::note_end(const Entry& order, robot::CycleResult result) {
                                        " with a fault; look at its pendant, then start again");
 }
 
+const Gripper& Run::gripper_now() const {
+  const int tool = links_.controller->position().tool;
+  const auto& grippers = links_.cell->grippers;
+  return grippers[static_cast<std::size_t>(std::clamp(tool, 1, static_cast<int>(grippers.size())) - 1)];
+}
+
+/// Another gripper is longer, wider, or stands open: it is taken where nothing is in the way of either.
+void Run::lift_to_change(const std::string& gripper) {
+  const Gripper& now = gripper_now();
+  if (now.name == gripper) return;
+  Pose up = here().base_from_flange * now.flange_from_tcp;
+  constexpr double kThere_mm = 1;
+  if (up.translation().z() > chooser_.travel_mm() - kThere_mm) return;
+  up.translation().z() = chooser_.travel_mm();
+  const auto stop = stops_at(chooser_.arm_with(now.name), std::span(&up, 1), here().joints, false);
+  if (!stop) return;  // the way itself says what is out of reach
+  Entry entry;
+  entry.event = Event::move_ordered;
+  entry.scene = scene_;
+  order(entry, robot::CycleCommand::way_points, *stop, now.name, 0, 0);
+}
+
 void Run::travel(const Pose& to, const std::string& gripper) {
+  lift_to_change(gripper);
   const auto stops = chooser_.way(here(), to, gripper);
   if (!stops)
     throw Error(ErrorCode::device,
@@ -66,6 +86,26 @@ void Run::travel(const Pose& to, const std::string& gripper) {
   entry.event = Event::move_ordered;
   entry.scene = scene_;
   order(entry, robot::CycleCommand::way_points, *stops, gripper, 0, 0);
+}
+
+FlangePose Run::go_to_look() {
+  const WorkCell& cell = *links_.cell;
+  if (cell.mount() != CameraMount::hand) return {};
+  const Gripper& gripper = gripper_now();
+  const Pose to = cell.camera->looks[static_cast<std::size_t>(look_)] * gripper.flange_from_tcp;
+  travel(to, gripper.name);
+  ArmWithTool arm = chooser_.arm_with(gripper.name);
+  arm.singularity = 0;  // a move of the joints
+  const auto stop = stops_at(arm, std::span(&to, 1), here().joints, false);
+  if (!stop)
+    throw Error(ErrorCode::device, cell.file.string() + ": camera.looks[" + std::to_string(look_) +
+                                       "]: saw a place out of the arm's reach or workspace, wanted one within");
+  Entry entry;
+  entry.event = Event::move_ordered;
+  entry.scene = scene_;
+  order(entry, robot::CycleCommand::way_points, *stop, gripper.name, 0, 0);
+  return
+      [this] { return Pose(robot::pose_of(links_.controller->position()) * gripper_now().flange_from_tcp.inverse()); };
 }
 
 bool Run::carry_out_pick(const Choice& choice, int scene, bool from_station) {

@@ -4,10 +4,10 @@
 namespace tribin::picking {
 
 CycleReport plan_first(const WorkCell& cell, const robot::RobotModel& robot, Vision& vision, const Filling& filling,
-                       const robot::SafetyLimits& limits) {
+                       const robot::SafetyLimits& limits, const FlangePose& flange) {
   const Chooser chooser(cell, robot, vision, limits);
   CycleReport report;
-  const Sight sight = vision.scan();
+  const Sight sight = vision.scan(flange);
   report.state = "no_pick";
   report.seen = sight.seen;
   report.find_ms = sight.find_ms;

@@ -25,6 +25,12 @@ Phase Run::next_resort() {
     resort_ = Resort::full_tilt;
     return Phase::choose;
   }
+  if (links_.cell->mount() == CameraMount::hand && look_ + 1 < static_cast<int>(links_.cell->camera->looks.size())) {
+    ++look_;
+    tell("no_pick", "the next scan is taken from look " + std::to_string(look_ + 1));
+    resort_ = Resort::next_look;
+    return Phase::scan;
+  }
   if (pushes_ < kMostPushes) {
     resort_ = Resort::push;
     return Phase::push;
@@ -97,7 +103,7 @@ Phase Run::push() {
     order(entry, robot::CycleCommand::way_points, *stops, push.gripper, kClosed_mm, kPushClass);
     report_.part = push.part_name, report_.gripper = push.gripper;
     tell("pushed", note);
-    resort_ = Resort::none;
+    resort_ = Resort::none, look_ = 0;
     return Phase::scan;
   }
   pushes_ = kMostPushes;

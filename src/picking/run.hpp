@@ -37,6 +37,10 @@ class Run {
                            const std::string& gripper, double opening_mm, int part_class);
   /// Through way points to where `to` begins. \throws Error device where no way is in reach
   void travel(const Pose& to, const std::string& gripper);
+  /// A camera on the flange: the arm goes to where it looks from, and tells where that is. \return none for a fixed one
+  FlangePose go_to_look();
+  const Gripper& gripper_now() const;  ///< as the controller tells
+  void lift_to_change(const std::string& gripper);
   void note_end(const Entry& order, robot::CycleResult result);
   bool carry_out_pick(const Choice& choice, int scene, bool from_station);
   const Chooser::Start& here();
@@ -58,7 +62,7 @@ class Run {
   std::optional<Choice> choice_;
   CycleReport report_;
   Resort resort_ = Resort::none;
-  int scene_ = 0, pushes_ = 0, failures_ = 0, turns_ = 0;
+  int scene_ = 0, pushes_ = 0, failures_ = 0, turns_ = 0, look_ = 0;
   double scan_s_ = 0;
   std::string station_trouble_;  ///< why what stands at the station stays there; empty = it does not
   struct Failed {

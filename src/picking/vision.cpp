@@ -21,8 +21,12 @@ class CameraVision : public Vision {
       known_.push_back(grasp::prepare_grasps(model(part.name), part, from.cell->grippers));
   }
 
-  Sight scan() override {
+  Sight scan(const FlangePose& flange) override {
     Shot shot = from_.camera->grab();
+    if (flange && !shot.taken.base_from_flange) {  // asked afterwards, while the arm still stands
+      shot.taken.base_from_flange = flange();
+      shot.taken.flange_time_ms = now_ms();
+    }
     scan_ = scan_of(std::move(shot), from_.rig).result.scan;
     const std::optional<std::int64_t> now = from_.any_age ? std::nullopt : std::optional(now_ms());
     const Pose base_from_input = base_from_camera(*from_.cell, scan_.taken, from_.camera->name(), now);

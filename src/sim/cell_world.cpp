@@ -31,7 +31,7 @@ CellWorld::CellWorld(const WorkCell& cell, const robot::RobotModel& robot, const
       random_(mixed(options.seed) ^ 0xCE11u),
       field_(options.robot_mm, options.seed),
       base_from_bin_(cell.bin->base_from_bin) {
-  base_from_camera_ =
+  parent_from_camera_ =
       cell.hand_eye.parent_from_camera * drawn_motion(options.hand_eye_mm, options.hand_eye_rad, random_);
   if (cell.rack) slots_ = picking::slots_of(*cell.rack);
   drop_parts(options);
@@ -193,6 +193,12 @@ void CellWorld::open(const controller_sim::Machine& machine) {
     truth.where = Whereabouts::lost;
     heap_->stand(part);
   }
+}
+
+Pose CellWorld::base_from_camera() const {
+  if (cell_.mount() == CameraMount::fixed) return parent_from_camera_;
+  const auto tool = static_cast<std::size_t>(std::max(active_, 0));
+  return base_from_tcp_ * cell_.grippers[tool].flange_from_tcp.inverse() * parent_from_camera_;
 }
 
 bool CellWorld::reachable(const Pose& base_from_tcp, int tool) const {

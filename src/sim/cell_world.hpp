@@ -37,7 +37,8 @@ class CellWorld {
     Pose base_from_part;
   };
   std::vector<Standing> standing() const;
-  const Pose& base_from_camera() const { return base_from_camera_; }  ///< the true one
+  /// The true one; of a camera on the flange where that stands now.
+  Pose base_from_camera() const;
   void note_scan();
 
  private:
@@ -69,7 +70,7 @@ class CellWorld {
   SimulatedCellOptions options_;
   Random random_;
   RobotField field_;
-  Pose base_from_bin_, base_from_camera_;
+  Pose base_from_bin_, parent_from_camera_;  ///< true; the parent is base or flange, as the mount says
   std::vector<picking::Slot> slots_;
   std::vector<Mesh> own_;
   std::vector<int> class_of_;

@@ -62,7 +62,7 @@ void check(const WorkCell& cell) {
   want(!cell.parts.empty(), "no [[part]]", "one at least");
   want(!cell.grippers.empty(), "no [[gripper]]", "one at least");
   want(!cell.robots.empty(), "no [[robot]]", "one");
-  want(cell.mount() == CameraMount::fixed, "a camera on the flange", "a fixed one");
+  want(cell.mount() == CameraMount::fixed || !cell.camera->looks.empty(), "no camera.looks", "one at least");
   want(cell.robots.front().controller.kind != ControllerKind::text, "a robot that is a client", "nx100 or hses");
 }
 
@@ -95,15 +95,20 @@ struct SimulatedCell::State : Camera {
         machine(options_of(world)),
         clock(machine, world),
         wire(machine, options.faults),
-        view(cell_view_of(cell)) {
-    view.camera_from_bin = world.base_from_camera().inverse() * cell.bin->base_from_bin;
+        view(cell_view_of(cell, cell.camera->looks.empty() ? Pose::Identity() : cell.camera->looks.front())) {
+    if (cell.mount() == CameraMount::hand) {  // the arm stands where it looks from
+      const Pose tcp = cell.camera->looks.front() * cell.grippers.front().flange_from_tcp;
+      machine.place(robot::position_from_pose(tcp, 0, 1));
+      world.follow(machine);
+    }
     machine.add_job(controller_sim::parse_job(controller_sim::handshake_job(), "BPICK"));
     machine.start("BPICK");
   }
 
   std::string name() const override { return "sim"; }
 
-  SimulatedScan scan(bool noisy) const {
+  SimulatedScan scan(bool noisy) {
+    view.camera_from_bin = world.base_from_camera().inverse() * cell.bin->base_from_bin;
     Random random(mixed(options.seed) ^ 0x5CA7u);  // one camera, one level of noise, for the whole run
     StructuredLight sensor;
     double top = 0;

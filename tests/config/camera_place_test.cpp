@@ -11,7 +11,9 @@ constexpr std::int64_t kNow = 1'795'345'000'000;
 WorkCell hand_cell() {
   WorkCell cell;
   cell.file = "cell.toml";
-  cell.camera = CellCamera{"camera.json", CameraMount::hand};
+  cell.camera.emplace();
+  cell.camera->file = "camera.json";
+  cell.camera->mount = CameraMount::hand;
   cell.hand_eye.parent_from_camera.translation() = Vec3(0, 50, 100);
   return cell;
 }

@@ -150,7 +150,7 @@ TEST(WorkCell, PosesLeftOutAreTheIdentity) {
 
 TEST(WorkCell, ComplaintsNameLineAndColumn) {
   EXPECT_EQ(complaint("[camera]\nfile = \"c.json\"\nmont = \"hand\"\n"),
-            "line 3, column 1: camera: saw the key \"mont\", wanted one of file, mount, keep_out_mm");
+            "line 3, column 1: camera: saw the key \"mont\", wanted one of file, mount, keep_out_mm, looks");
   EXPECT_EQ(complaint("[camera]\nfile = 7\n"),
             "line 2, column 8: camera.file: saw 7, wanted the name of a file, in quotes");
   EXPECT_EQ(complaint("[camera]\nfile = \"c\"\nmount = \"wall\"\n"),

@@ -144,6 +144,41 @@ TEST(Cycle, ResortsComeInTheirOrder) {
   bench.expect_truth_is_as_told();
 }
 
+TEST(Cycle, ACameraOnTheFlangeLooksFromItsPlaces) {
+  WorkCell cell = test::fake_work_cell();
+  cell.camera.emplace();
+  cell.camera->mount = CameraMount::hand;
+  for (const double x : {1000.0, 1100.0, 1200.0}) cell.camera->looks.push_back(test::looking_down(Vec3(x, 100, 900)));
+  Bench bench(4, cell);
+  bench.vision.shadowed = {{1, 1050}, {2, 1150}};
+  EXPECT_EQ(bench.run().status, "empty");
+  EXPECT_EQ(bench.count("placed"), 4);
+  ASSERT_EQ(bench.vision.looked_from.size(), static_cast<std::size_t>(bench.vision.scans));
+  const auto is_look = [&](const Vec3& at) {
+    return std::any_of(cell.camera->looks.begin(), cell.camera->looks.end(),
+                       [&](const Pose& look) { return (look.translation() - at).norm() < 0.1; });
+  };
+  // The first place is the usual one; a part that is placed leads back to it, and no part waits for a push.
+  EXPECT_NEAR(bench.vision.looked_from.front().x(), 1000, 0.1);
+  EXPECT_NEAR(bench.vision.looked_from.back().x(), 1000, 0.1);
+  for (const Vec3& at : bench.vision.looked_from) EXPECT_TRUE(is_look(at)) << at.transpose();
+  EXPECT_EQ(std::count_if(bench.told.begin(), bench.told.end(),
+                          [](const CycleReport& report) {
+                            return report.state == "placed" && report.resort == Resort::next_look;
+                          }),
+            2);
+  EXPECT_EQ(bench.count("pushed"), 0);
+  bench.expect_truth_is_as_told();
+}
+
+TEST(Cycle, ACameraOnTheFlangeWantsToKnowWhereToLookFrom) {
+  WorkCell cell = test::fake_work_cell();
+  cell.camera.emplace();
+  cell.camera->mount = CameraMount::hand;
+  Bench bench(1, cell);
+  EXPECT_THROW(bench.run(), Error);
+}
+
 TEST(Cycle, FivePushesInVainAndItAsks) {
   Bench bench(1);
   bench.vision.buried = {0};

@@ -153,8 +153,9 @@ class FakeVision : public picking::Vision {
     }
   }
 
-  picking::Sight scan() override {
+  picking::Sight scan(const picking::FlangePose& flange) override {
     ++scans;
+    if (flange) looked_from.push_back(flange().translation());
     picking::Sight sight;
     seen_ = in_bin_();
     for (std::size_t i = 0; i < seen_.size(); ++i)
@@ -172,6 +173,7 @@ class FakeVision : public picking::Vision {
       if (!seen_[i] || !places.count(kind_of(part))) continue;
       if (hard.count(part) && (!options.grippers.empty() || options.max_tilt_rad)) continue;
       if (std::find(buried.begin(), buried.end(), part) != buried.end()) continue;
+      if (shadowed.count(part) && looked_from.back().x() < shadowed.at(part)) continue;
       const Pose at = looking_down(place_in_bin(part) + Vec3(0, 0, kGrip_mm));
       const bool tried = std::any_of(options.failed.begin(), options.failed.end(), [&](const grasp::FailedPick& f) {
         return (f.base_from_tcp.translation() - at.translation()).norm() < 5;
@@ -207,9 +209,11 @@ class FakeVision : public picking::Vision {
   const Part& model(const std::string& name) const override { return models_[name == "b"]; }
 
   int scans = 0, pushes = 0, pushes_to_free = 1;
-  std::map<int, bool> hard;  ///< parts that only full tilt takes
-  std::vector<int> buried;   ///< parts that a push frees
-  std::string suspect;       ///< of the calibration
+  std::map<int, bool> hard;        ///< parts that only full tilt takes
+  std::vector<int> buried;         ///< parts that a push frees
+  std::vector<Vec3> looked_from;   ///< by a camera on the flange: where that stood at each scan
+  std::map<int, double> shadowed;  ///< parts that are seen well enough from beyond that x of the flange alone
+  std::string suspect;             ///< of the calibration
   std::vector<grasp::PlanOptions> asked;
 
  private:

@@ -18,7 +18,8 @@ namespace tribin {
 struct CellCamera {
   std::filesystem::path file;  ///< camera file (intrinsics, noise)
   CameraMount mount = CameraMount::fixed;
-  double keep_out_mm = 0;  ///< radius of a ball about its optical centre that its body fills; 0 = not said
+  double keep_out_mm = 0;   ///< radius of a ball about its optical centre that its body fills; 0 = not said
+  std::vector<Pose> looks;  ///< on the flange: base_from_flange of its scans, the usual one first
 };
 
 /// Where the camera stands: on the base (fixed) or on the flange (hand).

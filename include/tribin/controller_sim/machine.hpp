@@ -47,6 +47,8 @@ class Machine {
   int delete_job(const std::string& name);
 
   robot::ControllerStatus status() const;
+  /// Where the arm stands before anything has moved it.
+  void place(const robot::CartesianPosition& at) { at_ = at; }
   robot::CartesianPosition position() const;                   ///< on the way while it moves
   const std::vector<long>& pulses() const { return pulses_; }  ///< the last ones that it was sent to
   robot::RunningJob running_job() const;

@@ -27,7 +27,7 @@ enum class Phase {
 std::string_view name_of(Phase phase);
 
 /// What is tried, in this order, when nothing can be picked.
-enum class Resort { none, next_gripper, full_tilt, push };
+enum class Resort { none, next_gripper, full_tilt, next_look, push };
 std::string_view name_of(Resort resort);
 
 /// One line of the run's report.
@@ -80,13 +80,14 @@ struct RunLinks {
 
 /// Picks and places until the bin is empty, the rack is full, nothing can be picked, or an operator is needed.
 /// Retries: a grasp that failed is not tried again in the next three scans. Nothing to pick: the parts' other grippers,
-/// then their full tilt, then a push (one a scan, at most five in a row), then it asks.
-/// \throws Error device (the robot does not do what it is told: the journal says where it was), bad_input (the cell
-/// lacks a rack, a gripper, a robot)
+/// then their full tilt, then a camera on the flange looks from its next place, then a push (one a scan, at most five
+/// in a row), then it asks. \throws Error device (the robot does not do what it is told: the journal says where it
+/// was), bad_input (the cell lacks a rack, a gripper, a robot)
 RunEnd run_picking(const RunLinks& links, const RunOptions& options);
 
 /// What a run would do first, without a robot: one scan, one plan. \param filling  of the rack
+/// \param flange  of a camera on it, as for Vision::scan
 CycleReport plan_first(const WorkCell& cell, const robot::RobotModel& robot, Vision& vision, const Filling& filling,
-                       const robot::SafetyLimits& limits);
+                       const robot::SafetyLimits& limits, const FlangePose& flange = {});
 
 }  // namespace tribin::picking

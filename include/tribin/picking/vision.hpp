@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -17,6 +18,9 @@ namespace tribin::picking {
 /// Where a part of a class may be put, any of the poses will do.
 using Places = std::map<std::string, std::vector<Pose>>;
 
+/// base_from_flange, now.
+using FlangePose = std::function<Pose()>;
+
 /// What one scan shows.
 struct Sight {
   std::string status;               ///< of the finder: ok, empty, not_empty_no_object, no_data, time_limit
@@ -31,7 +35,8 @@ class Vision {
  public:
   virtual ~Vision() = default;
   /// Takes a scan and finds the parts in it.
-  virtual Sight scan() = 0;
+  /// \param flange  where the flange stands, asked when the scan is taken; none for a camera that is not on it
+  virtual Sight scan(const FlangePose& flange) = 0;
   /// The last scan. \return null before the first one, and where there is no camera
   virtual const Scan* last_scan() const { return nullptr; }
   /// Grasps for what the last scan showed. May be asked again with other options.
