@@ -44,16 +44,16 @@ TEST(WorkCell, TheExampleIsRead) {
   EXPECT_EQ(cell.mount(), CameraMount::fixed);
   EXPECT_TRUE(std::filesystem::exists(cell.camera->file));
   EXPECT_NEAR(cell.hand_eye.sigma_rad, 0.02 * kDegree, 1e-12);
-  // The camera looks down: its z axis is the base's -z.
-  EXPECT_LT((base_from_camera(cell) * Vec3(0, 0, 1200) - Vec3(600, 0, 0)).norm(), 1e-9);
   ASSERT_TRUE(cell.bin);
+  // The camera looks down on the middle of the bin's floor: its z axis is the base's -z.
+  EXPECT_LT((base_from_camera(cell) * Vec3(0, 0, 1200) - cell.bin->base_from_bin.translation()).norm(), 1e-9);
   EXPECT_EQ(cell.bin->inner_size_mm, Vec3(460, 360, 200));
   ASSERT_EQ(cell.grippers.size(), 1u);
-  EXPECT_EQ(cell.grippers[0].boxes.size(), 2u);
-  EXPECT_EQ(cell.grippers[0].flange_from_tcp.translation(), Vec3(0, 0, 180));
+  EXPECT_EQ(cell.grippers[0].boxes.size(), 1u);
+  EXPECT_EQ(cell.grippers[0].flange_from_tcp.translation(), Vec3(0, 0, 210));
   ASSERT_EQ(cell.parts.size(), 2u);
   for (const CellPart& part : cell.parts) EXPECT_TRUE(std::filesystem::exists(part.cad)) << part.cad;
-  EXPECT_NEAR(cell.parts[1].max_tilt_rad, 40 * kDegree, 1e-12);
+  EXPECT_NEAR(cell.parts[1].max_tilt_rad, 50 * kDegree, 1e-12);
   ASSERT_TRUE(cell.rack);
   EXPECT_EQ(cell.rack->slots.columns, 4);
   ASSERT_EQ(cell.robots.size(), 1u);
