@@ -18,7 +18,9 @@ foreach(name paper heaps flips)  # they drive the command line
   endif()
 endforeach()
 target_include_directories(campaign_primitives PRIVATE ${CMAKE_CURRENT_SOURCE_DIR})
-target_include_directories(campaign_simulator PRIVATE ${PROJECT_SOURCE_DIR}/src)  # draws scenes as data sets do
+foreach(name simulator quality)
+  target_include_directories(campaign_${name} PRIVATE ${PROJECT_SOURCE_DIR}/src)  # they draw scenes as data sets do
+endforeach()
 if(TARGET campaign_picking)
   target_compile_definitions(campaign_picking PRIVATE TRIBIN_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
 endif()

@@ -7,7 +7,8 @@
 namespace tribin {
 namespace {
 
-constexpr int kHalfWindow = 2;  // residuals are averaged over 5 x 5 rendered pixels: a fifth of the noise
+constexpr int kHalfWindow =
+    4;  // residuals are averaged over 9 x 9 rendered pixels: a third of noise correlated over one
 
 /// What the scan says of a rendered pixel.
 enum class State : std::uint8_t { unknown, compared, in_front, behind };
@@ -83,13 +84,6 @@ Mean window_mean(const Residuals& residuals, const IndexRender& r, int i, int j,
   return out;
 }
 
-/// Variance of the surface's place along its normal that the pose's covariance leaves [mm^2].
-double pose_variance(const Instance& instance, const Eigen::Vector3d& n, const Eigen::Vector3d& x) {
-  Eigen::Matrix<double, 1, 6> j;
-  j << n.transpose(), (x - Eigen::Vector3d(instance.camera_from_part.translation())).cross(n).transpose();
-  return (j * Eigen::Matrix<double, 6, 6>(instance.covariance) * j.transpose()).value();
-}
-
 struct Piece {
   Deviation told;
   double mirrored_share = 0;
@@ -102,7 +96,7 @@ Piece describe(const Part& part, const SceneDepth& scene, const PartPixels& pixe
   Piece out;
   Deviation& d = out.told;
   std::vector<int> votes(part.model.primitives.size() + 1, 0);
-  Eigen::Vector3d middle = Eigen::Vector3d::Zero(), normal = Eigen::Vector3d::Zero();
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
   double off = 0, variance = 0;
   int behind = 0, mirrored = 0;
   for (std::size_t m = 0; m < members.size(); ++m) {
@@ -115,7 +109,6 @@ Piece describe(const Part& part, const SceneDepth& scene, const PartPixels& pixe
     const double pixel_mm2 = z * z / (scene.camera.fx * scene.camera.fy) * pixels.step * pixels.step;
     d.area_mm2 += pixel_mm2 / std::abs(n.dot(ray));
     middle += x;
-    normal += n;
     off += residuals.off[k];
     variance += residuals.sigma[k] * residuals.sigma[k];
     behind += residuals.state[k] == State::behind;
@@ -125,8 +118,7 @@ Piece describe(const Part& part, const SceneDepth& scene, const PartPixels& pixe
   const auto count = static_cast<double>(members.size());
   middle /= count;
   d.depth_mm = off / count;
-  d.sigma_mm = std::sqrt(variance / count * std::min(1.0, inflation / count) +
-                         pose_variance(instance, normal.normalized(), middle) + ripple * ripple);
+  d.sigma_mm = std::sqrt(variance / count * std::min(1.0, inflation / count) + ripple * ripple);
   d.at_part_mm = instance.camera_from_part.inverse() * Vec3(middle);
   d.primitive = static_cast<int>(std::max_element(votes.begin(), votes.end()) - votes.begin());
   d.kind = 2 * behind > count ? "missing" : d.depth_mm < 0 ? "dent" : "raised";
@@ -169,15 +161,13 @@ std::vector<Deviation> find_deviations(const Part& part, const SceneDepth& scene
       const std::size_t k = r.index(i, j);
       if (residuals.state[k] == State::in_front) side[k] = 1;
       if (means[k].count == 0) continue;
-      const int u = r.u0 + i * pixels.step, v = r.v0 + j * pixels.step;
-      const Eigen::Vector3d n = r.normal[static_cast<std::size_t>(r.triangle[k])].cast<double>();
-      const Eigen::Vector3d x = Eigen::Vector3d(scene.camera.ray(u, v)) / double(r.inverse_z[k]);
-      const double sigma = std::sqrt(means[k].sigma * means[k].sigma + ripple * ripple + pose_variance(instance, n, x));
+      // Not what the pose leaves open: it has settled on these very points, and moves whole faces.
+      const double sigma = std::max(means[k].sigma, ripple);
       if (std::abs(means[k].off) > form + 4 * sigma) side[k] = means[k].off > 0 ? 1 : -1;
     }
-  // Connected pieces. Smaller than a hundredth of what is seen, or than two windows, is chance.
+  // Connected pieces. Smaller than a hundredth of what is seen, or than a window, is chance.
   constexpr int kWindow = (2 * kHalfWindow + 1) * (2 * kHalfWindow + 1);
-  const auto least = std::max(2.0 * kWindow, 0.01 * residuals.compared);
+  const auto least = std::max<double>(kWindow, 0.01 * residuals.compared);
   std::vector<std::size_t> members;
   std::vector<bool> done(r.triangle.size(), false);
   for (std::size_t first = 0; first < side.size(); ++first) {
@@ -203,6 +193,14 @@ std::vector<Deviation> find_deviations(const Part& part, const SceneDepth& scene
     const Piece piece = describe(part, scene, pixels, instance, residuals, members, inflation, ripple);
     if (piece.mirrored_share > 0.25) continue;  // may be another surface's light
     out.push_back(piece.told);
+  }
+  // Fringes of two surfaces that add up leave ridges beside furrows; what is pressed in or broken off leaves no ridges.
+  if (pixels.shiny) {
+    double above = 0, below = 0;
+    for (const Deviation& d : out) (d.depth_mm > 0 ? above : below) += d.kind == "missing" ? 0 : d.area_mm2;
+    std::erase_if(out, [&](const Deviation& d) {
+      return d.kind != "missing" && (d.depth_mm > 0 ? below : above) > 0.25 * d.area_mm2;
+    });
   }
   std::stable_sort(out.begin(), out.end(),
                    [](const Deviation& a, const Deviation& b) { return a.area_mm2 > b.area_mm2; });

@@ -33,8 +33,8 @@ void dilate(Flags& flags, int width, int height, int n) {
 bool sees_itself(const SceneDepth& scene, const Eigen::Vector3d& point, const Eigen::Vector3d& normal, double length,
                  double margin) {
   const Eigen::Vector3d view = point.normalized(), on = view - 2 * view.dot(normal) * normal;
-  constexpr int kSteps = 48;
-  for (int s = 2; s <= kSteps; ++s) {
+  constexpr int kSteps = 96;
+  for (int s = 3; s <= kSteps; ++s) {
     const Eigen::Vector3d x = point + on * (length * s / kSteps);
     if (!(x.z() > 0)) return false;
     const auto u = static_cast<int>(std::lround(x.x() / x.z() * scene.camera.fx + scene.camera.cx));
@@ -66,6 +66,8 @@ Flags mirrored_pixels(const Part& part, const SceneDepth& scene, const IndexRend
       for (int j = j0; j < j1; ++j)
         for (int i = i0; i < i1; ++i) out[r.index(i, j)] = 1;
     }
+  // Curved surfaces and what lies between the cast rays: two squares more.
+  dilate(out, r.width, r.height, 2 * kSquare);
   return out;
 }
 

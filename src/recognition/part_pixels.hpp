@@ -17,6 +17,7 @@ struct PartPixels {
   std::vector<std::uint8_t> inner_primitive;
   /// 1 where a mirror would show the camera another surface of the scan: light of that one may be mixed in.
   std::vector<std::uint8_t> mirrored;
+  bool shiny = false;  ///< other surfaces' light shows on the parts of this scan
   int step = 1;
 
   int primitive(const Part& part, std::size_t k) const {
