@@ -19,7 +19,7 @@ void dilate(Flags& flags, int width, int height, int n) {
         if (next < i) next = i;
         while (next < count && !line[static_cast<std::size_t>(next)]) ++next;
         if (line[static_cast<std::size_t>(i)]) last = i;
-        if (i - last <= n || next - i <= n) flags[at(l, i)] = 1;
+        if (i - last <= n || (next < count && next - i <= n)) flags[at(l, i)] = 1;
       }
     }
   };

@@ -54,7 +54,7 @@ void decide(const Part& part, bool pose_is_told, Quality& quality) {
   if (!quality.reasons.empty()) {
     quality.decision = QualityDecision::deviates;
   } else if (quality.checked_fraction < kLeastChecked) {
-    quality.reasons = {written("%.0f %% of its outline's inside could be compared, less than %.0f %%",
+    quality.reasons = {written("%.0f %% of its silhouette could be compared, less than %.0f %%",
                                100 * quality.checked_fraction, 100 * kLeastChecked)};
   } else {
     quality.decision = QualityDecision::nominal;
