@@ -193,9 +193,7 @@ std::vector<Deviation> find_deviations(const Part& part, const SceneDepth& scene
     // What lies on the part or before it is no fault of it.
     if (another_thing || static_cast<double>(members.size()) < least) continue;
     const Piece piece = describe(part, scene, pixels, instance, residuals, members, inflation, ripple);
-    // May be another surface's light: some millimetres off, or a small ghost.
-    const bool ghost = piece.told.kind != "missing" || static_cast<double>(members.size()) < 0.02 * residuals.compared;
-    if (piece.mirrored_share > 0.25 && ghost) continue;
+    if (piece.mirrored_share > 0.25) continue;  // may be another surface's light, or a ghost in the shadow
     out.push_back(piece.told);
   }
   // Fringes of two surfaces that add up leave ridges beside furrows; what is pressed in or broken off leaves no ridges.
