@@ -219,10 +219,14 @@ int main(int argc, char** argv) try {
     std::fflush(stdout);
     std::filesystem::remove(journal_file);
   }
-  std::printf("%d bins, %d parts: placed %d (%.1f %%), without help %d (%.1f %%); %.2f grips a placed part\n",
-              totals.bins, totals.parts, totals.placed, 100.0 * totals.placed / std::max(1, totals.parts),
-              totals.placed_without_help, 100.0 * totals.placed_without_help / std::max(1, totals.parts),
-              static_cast<double>(totals.picks) / std::max(1, totals.placed));
+  // What is put down at the station is gripped there once more: a step of its way, no new attempt.
+  std::printf(
+      "%d bins, %d parts: placed %d (%.1f %%), without help %d (%.1f %%); %.2f attempts a placed part, %.2f grips with "
+      "those at the station\n",
+      totals.bins, totals.parts, totals.placed, 100.0 * totals.placed / std::max(1, totals.parts),
+      totals.placed_without_help, 100.0 * totals.placed_without_help / std::max(1, totals.parts),
+      static_cast<double>(totals.picks - totals.put_down) / std::max(1, totals.placed),
+      static_cast<double>(totals.picks) / std::max(1, totals.placed));
   std::printf("missed %d, lost %d, gripped anew %d, pushes %d, disturbed %d\n", totals.missed, totals.lost,
               totals.put_down, totals.pushes, totals.disturbed);
   std::printf("collisions %d, wrong class or slot %d, placed twice %d\n", totals.collisions, totals.wrong,

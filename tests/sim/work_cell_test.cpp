@@ -256,6 +256,43 @@ TEST(SimulatedCell, TheSameSeedIsTheSameCell) {
   }
 }
 
+TEST(SimulatedCell, ACameraOnTheFlangeSeesFromWhereTheArmStands) {
+  WorkCell work_cell = read_work_cell(kSource / "examples/cells/flange_cell.toml");
+  work_cell.parts = {work_cell.parts.back()};
+  const robot::RobotModel robot = read_robot(work_cell.robots.front().model);
+  SimulatedCellOptions options;
+  options.parts = 1;
+  options.hand_eye_mm = options.hand_eye_rad = options.robot_mm = 0;
+  SimulatedCell cell(work_cell, robot, make_cell_stock({read_cad(work_cell.parts.front().cad)}), options);
+  const auto controller = cell.connect();
+  const Gripper& gripper = work_cell.grippers.front();
+  int cycle = 0;
+  for (const Pose& look : work_cell.camera->looks) {
+    SCOPED_TRACE(cycle);
+    robot::CycleOrder order;
+    order.command = robot::CycleCommand::way_points;
+    order.cycle = ++cycle;
+    order.positions = {robot::position_from_pose(look * gripper.flange_from_tcp, 0, 1)};
+    ASSERT_EQ(run_cycle(*controller, cell.clock(), order), robot::CycleResult::done);
+    const Scan scan = std::get<Scan>(cell.camera().grab().content);
+    const Pose bin_from_camera =
+        work_cell.bin->base_from_bin.inverse() * base_from_camera(work_cell, look) * scan.input_from_camera;
+    int floor = 0, below = 0;
+    for (int v = 0; v < scan.z_mm.height; v += 8)
+      for (int u = 0; u < scan.z_mm.width; u += 8) {
+        const double z = scan.z_mm(u, v);
+        if (!(z > 0)) continue;
+        const PinholeCamera& c = scan.camera;
+        const Vec3 p = bin_from_camera * Vec3((u - c.cx) / c.fx * z, (v - c.cy) / c.fy * z, z);
+        if (std::abs(p.x()) > 300 || std::abs(p.y()) > 200) continue;
+        floor += std::abs(p.z()) < 2;
+        below += p.z() < -4;
+      }
+    EXPECT_GT(floor, 500);
+    EXPECT_LT(below, floor / 50);
+  }
+}
+
 TEST(SimulatedCell, TouchingThePartOrTheBinIsNoted) {
   const SmallCell small;
   SimulatedCellOptions options;
