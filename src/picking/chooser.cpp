@@ -10,9 +10,10 @@ namespace tribin::picking {
 namespace {
 
 constexpr double kFirstTilt = 30 * kDegree;  // of an approach, before anything steeper is tried
-constexpr int kMostPerPart = 12;             // grasps of a part that are looked at for a way into a slot
-constexpr double kSamePart_mm = 20;          // a part that was missed lies that near to where it was
-constexpr double kTravelGap_mm = 20;         // over all that stands
+// Grasps of a part that are looked at for a way into a slot; more before it goes to the station.
+constexpr int kMostPerPart = 12, kMostDirect = 40;
+constexpr double kSamePart_mm = 20;   // a part that was missed lies that near to where it was
+constexpr double kTravelGap_mm = 20;  // over all that stands
 
 /// What software refuses of a motion, whatever the controller does.
 bool of_motion(robot::RefusalCode code) { return code >= robot::RefusalCode::not_finite; }
@@ -92,12 +93,12 @@ Places Chooser::places(const Filling& filling) const {
   return out;
 }
 
-grasp::PlanOptions Chooser::plan_options(Resort resort, std::vector<grasp::FailedPick> failed) const {
+grasp::PlanOptions Chooser::plan_options(Resort resort, std::vector<grasp::FailedPick> failed, bool closely) const {
   grasp::PlanOptions options;
   options.limit_margin_rad = limits_.limit_margin_rad;
   options.singularity = limits_.singularity;
   options.min_score = limits_.min_score;
-  options.most_per_part = kMostPerPart;
+  options.most_per_part = closely ? kMostDirect : kMostPerPart;
   options.failed = std::move(failed);
   if (resort < Resort::full_tilt) options.max_tilt_rad = kFirstTilt;
   if (resort == Resort::none)

@@ -26,7 +26,8 @@ class Chooser {
   const std::vector<Slot>& slots() const { return slots_; }
   /// The parts that a slot waits for, with all poses in which it may stand in one, or at the station.
   Places places(const Filling& filling) const;
-  grasp::PlanOptions plan_options(Resort resort, std::vector<grasp::FailedPick> failed) const;
+  /// \param closely  more grasps of each part, where few do not lead to a slot
+  grasp::PlanOptions plan_options(Resort resort, std::vector<grasp::FailedPick> failed, bool closely = false) const;
   bool has_more_grippers() const { return cell_.grippers.size() > 1; }
 
   /// Where the arm stands.

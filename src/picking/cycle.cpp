@@ -135,9 +135,15 @@ Phase Run::choose() {
   const Places places = chooser_.places(now().filling);
   StageTimes times;
   auto watch = std::make_optional<StageTimer>(times, "plan");
-  const grasp::Plan plan = links_.vision->plan(chooser_.plan_options(resort_, failed), places);
+  grasp::Plan plan = links_.vision->plan(chooser_.plan_options(resort_, failed), places);
   std::vector<std::string> why;
-  choice_ = chooser_.choose(plan, now().filling, here(), wheres(), to_avoid(), why);
+  constexpr Chooser::Where kDirect[] = {Chooser::Where::slots};
+  choice_ = chooser_.choose(plan, now().filling, here(), kDirect, to_avoid(), why);
+  if (!choice_ && wheres().size() > 1) {  // gripping anew takes longer than another look at the plan
+    plan = links_.vision->plan(chooser_.plan_options(resort_, failed, true), places);
+    why.clear();
+    choice_ = chooser_.choose(plan, now().filling, here(), wheres(), to_avoid(), why);
+  }
   watch.reset();
   report_.plan_ms += times.total();
   report_.refused = plan.reasons;

@@ -80,7 +80,8 @@ Phase Run::regrasp() {
       failed_.push_back(
           {{grasp.at(grasp::Step::pick)->base_from_tcp, grasp.gripper}, standing.base_from_part.translation(), scene_});
       tell("missed", "at the station");
-      return ++failures_ >= kMostFailures ? give_up("is not gripped") : Phase::regrasp;
+      // Nothing moved it there: it does not stand as it was thought to, and jaws would only push it.
+      return give_up("is not gripped, so that it does not stand there as it should");
     }
   return give_up("no grasp leads from there to a slot (" + text_of(plan.reasons) + ")");
 }
