@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "coarse_mesh.hpp"
 #include "tribin/core/error.hpp"
 #include "tribin/part/symmetry.hpp"
 #include "views.hpp"
@@ -79,6 +80,8 @@ Part compile_part(const Mesh& mesh, const PartOptions& options) {
   part.box_min = part.render_mesh.box_min;
   part.box_max = part.render_mesh.box_max;
   part.diameter_mm = largest_distance(mesh.vertices);
+  part.coarse_error_mm = 0.001 * part.diameter_mm;  // a tenth of the first look-ups' tolerance
+  part.coarse_mesh = make_render_mesh(coarse_mesh(mesh, part.coarse_error_mm));
 
   double moment = 0;
   for (const auto& t : mesh.triangles) {

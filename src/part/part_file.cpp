@@ -142,16 +142,19 @@ bool is_sound(const Part& part) {
     return std::all_of(triples.begin(), triples.end(), [&](const auto& t) { return below(t, end); });
   };
   const std::size_t triangles = part.mesh.triangles.size(), primitives = part.model.primitives.size();
-  const RenderMesh& render = part.render_mesh;
   bool sound = triangles > 0 && all_below(part.mesh.triangles, part.mesh.vertices.size()) &&
                (part.mesh.face_of_triangle.empty() || part.mesh.face_of_triangle.size() == triangles) &&
-               render.triangles.size() == triangles && render.normals.size() == triangles &&
-               render.offsets.size() == triangles && all_below(render.triangles, render.vertices.size()) &&
-               part.primitive_of_triangle.size() == triangles && below(part.primitive_of_triangle, primitives + 1) &&
-               part.exposed_mm2.size() == primitives && !part.symmetry.discrete.empty() && !part.views.empty();
-  for (const OutlineEdge& e : render.edges) {
-    sound = sound && below(e.vertices, render.vertices.size());
-    for (std::int32_t t : e.triangles) sound = sound && t >= -1 && t < static_cast<std::int64_t>(triangles);
+               part.render_mesh.triangles.size() == triangles && part.primitive_of_triangle.size() == triangles &&
+               below(part.primitive_of_triangle, primitives + 1) && part.exposed_mm2.size() == primitives &&
+               !part.symmetry.discrete.empty() && !part.views.empty();
+  for (const RenderMesh* render : {&part.render_mesh, &part.coarse_mesh}) {
+    const std::size_t count = render->triangles.size();
+    sound = sound && render->normals.size() == count && render->offsets.size() == count &&
+            all_below(render->triangles, render->vertices.size());
+    for (const OutlineEdge& e : render->edges) {
+      sound = sound && below(e.vertices, render->vertices.size());
+      for (std::int32_t t : e.triangles) sound = sound && t >= -1 && t < static_cast<std::int64_t>(count);
+    }
   }
   for (std::size_t i = 0; i < primitives; ++i) {
     const Primitive& p = part.model.primitives[i];

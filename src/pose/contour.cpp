@@ -20,28 +20,39 @@ constexpr double kSteepest = 0.42;  // cos 65 deg
 /// Pixel nearest to a place right of -1. (std::lround is a call.)
 int nearest_pixel(double x) { return static_cast<int>(std::min(x, 1e6) + 1.5) - 1; }
 
-/// Is the scan at pixel (x, y) the plane n . p = rho, up to noise and a pixel's slope?
-bool on_surface(const SceneDepth& scene, double x, double y, const Eigen::Vector3d& n, double rho) {
+/// A facet's plane n . p = rho in the camera frame; n . ray is affine in the pixel.
+struct FacetPlane {
+  double along_u, along_v, along_0, rho;
+
+  FacetPlane(const PinholeCamera& camera, const Eigen::Vector3d& n, double rho_mm)
+      : along_u(n.x() / camera.fx),
+        along_v(n.y() / camera.fy),
+        along_0(n.z() - along_u * camera.cx - along_v * camera.cy),
+        rho(rho_mm) {}
+};
+
+/// Is the scan at pixel (x, y) the plane, up to noise and a pixel's slope?
+/// \param sigma_mm  of the depth around there.
+bool on_surface(const SceneDepth& scene, double x, double y, const FacetPlane& plane, double sigma_mm) {
   if (!(x > -1 && y > -1)) return false;
   const int u = nearest_pixel(x), v = nearest_pixel(y);
   if (!scene.z_mm.contains(u, v)) return false;
-  const float z = scene.z_mm(u, v);
+  const double z = scene.z_mm(u, v);
   if (!(z > 0)) return false;
-  const Eigen::Vector3d ray = scene.camera.ray(u, v);
-  const double slant = std::abs(n.dot(ray));
-  const double r = n.dot(ray) * z - rho;
-  return std::abs(r) < 6 * scene.sigma_mm(u, v) * slant + z / scene.camera.fx;
+  const double along = plane.along_u * u + plane.along_v * v + plane.along_0;
+  return std::abs(along * z - plane.rho) < 6 * sigma_mm * std::abs(along) + z / scene.camera.fx;
 }
 
 /// Signed place of the scan's edge along m from (x, y) [px], nearest to 0; NaN if there is none within reach.
-double edge_along(const SceneDepth& scene, double x, double y, const Vec2& m, const Eigen::Vector3d& n, double rho,
-                  double reach) {
+double edge_along(const SceneDepth& scene, double x, double y, const Vec2& m, const FacetPlane& plane, double reach) {
+  const double sigma_mm =
+      scene.z_mm.contains(nearest_pixel(x), nearest_pixel(y)) ? scene.sigma_mm(nearest_pixel(x), nearest_pixel(y)) : 0;
   // Places k - half along m, looked at when asked for: most edges lie near 0.
   const int half = std::min(static_cast<int>(std::ceil(reach)) + 2, 31);
   std::array<std::int8_t, 64> known{};
   const auto on = [&](int k) {
     std::int8_t& at = known[static_cast<std::size_t>(k)];
-    if (at == 0) at = on_surface(scene, x + (k - half) * m[0], y + (k - half) * m[1], n, rho) ? 1 : -1;
+    if (at == 0) at = on_surface(scene, x + (k - half) * m[0], y + (k - half) * m[1], plane, sigma_mm) ? 1 : -1;
     return at > 0;
   };
   for (int away = 0; away < half - 1; ++away)
@@ -52,6 +63,44 @@ double edge_along(const SceneDepth& scene, double x, double y, const Vec2& m, co
       if (on(k) && !on(k + 1) && on(k - 1) && !on(k + 2)) return s;
     }
   return std::nan("");
+}
+
+/// An edge between a facet that looks at the camera and one that does not.
+struct SilhouetteEdge {
+  std::uint32_t from, to;  ///< vertices, in the facet's winding
+  std::uint32_t facet;     ///< the one that looks at the camera
+  float height_mm;         ///< of the camera above it
+};
+
+/// \param eye  the camera in the part frame [mm].
+void find_silhouette(const RenderMesh& mesh, const Vec3f& eye, std::vector<SilhouetteEdge>& out) {
+  thread_local std::vector<float> side;
+  thread_local std::vector<std::uint8_t> front;
+  thread_local std::vector<std::uint32_t> found;
+  const std::size_t triangles = mesh.triangles.size();
+  // One byte a triangle, and one before them that stands for the open side of borders.
+  side.resize(triangles);
+  front.assign(triangles + 1, 0);
+  raster::sides_of_camera(mesh.normals.data()->data(), mesh.offsets.data(), triangles, eye, side.data());
+  for (std::size_t k = 0; k < triangles; ++k) front[k + 1] = side[k] > 0;
+  // Without a branch: which edges are silhouette cannot be predicted.
+  found.resize(mesh.edges.size() + 1);
+  std::size_t n = 0;
+  for (std::size_t k = 0; k < mesh.edges.size(); ++k) {
+    const OutlineEdge& e = mesh.edges[k];
+    found[n] = static_cast<std::uint32_t>(k);
+    n += front[static_cast<std::size_t>(e.triangles[0] + 1)] != front[static_cast<std::size_t>(e.triangles[1] + 1)];
+  }
+  out.clear();
+  for (std::size_t k = 0; k < n; ++k) {
+    const OutlineEdge& e = mesh.edges[found[k]];
+    const auto facet = static_cast<std::uint32_t>(front[static_cast<std::size_t>(e.triangles[0] + 1)] ? e.triangles[0]
+                                                                                                      : e.triangles[1]);
+    const auto& t = mesh.triangles[facet];
+    const std::uint32_t a = e.vertices[0], b = e.vertices[1];
+    const bool along = (t[0] == a && t[1] == b) || (t[1] == a && t[2] == b) || (t[2] == a && t[0] == b);
+    out.push_back({along ? a : b, along ? b : a, facet, side[facet]});
+  }
 }
 
 }  // namespace
@@ -68,45 +117,30 @@ ContourSums contour_sums(const RenderMesh& mesh, const SceneDepth& scene, const 
   double squares = 0, weights = 0;
   Eigen::Matrix<double, 6, 6> h = Eigen::Matrix<double, 6, 6>::Zero();
   Eigen::Matrix<double, 6, 1> b = Eigen::Matrix<double, 6, 1>::Zero();
-  const Vec3f eye = Vec3f((-(rotation.transpose() * camera_from_part.translation())).cast<float>());
-  // One byte a triangle, and one that stands for the open side of borders.
-  thread_local std::vector<float> side;
-  thread_local std::vector<std::uint8_t> front;
-  const std::size_t triangles = mesh.triangles.size();
-  side.resize(triangles);
-  front.assign(triangles + 1, 0);
-  raster::sides_of_camera(mesh.normals.data()->data(), mesh.offsets.data(), triangles, eye, side.data());
-  for (std::size_t k = 0; k < triangles; ++k) front[k] = side[k] > 0;
-  const std::uint8_t* faces_camera = front.data();
-  for (const OutlineEdge& edge : mesh.edges) {
-    const auto at = [&](std::int32_t t) { return t < 0 ? triangles : static_cast<std::size_t>(t); };
-    const std::uint8_t front0 = faces_camera[at(edge.triangles[0])], front1 = faces_camera[at(edge.triangles[1])];
-    if (front0 == front1) continue;
-    const Eigen::Vector3d p0 = camera_from_part * mesh.vertices[edge.vertices[0]].cast<double>();
-    const Eigen::Vector3d p1 = camera_from_part * mesh.vertices[edge.vertices[1]].cast<double>();
-    if (p0.z() <= 1 || p1.z() <= 1) continue;
-    const auto seen = static_cast<std::size_t>(edge.triangles[front0 ? 0 : 1]);
-    const Eigen::Vector3d n = rotation * mesh.normals[seen].cast<double>();
-    const double rho = n.dot(p0);
-    if (-rho / p0.norm() < kSteepest) continue;
-    const Vec2 a = camera.project(Vec3(p0)), e = camera.project(Vec3(p1));
+  thread_local std::vector<SilhouetteEdge> silhouette;
+  find_silhouette(mesh, Vec3f((-(rotation.transpose() * camera_from_part.translation())).cast<float>()), silhouette);
+  const Eigen::Matrix3f turn = rotation.cast<float>();
+  const Eigen::Vector3f shift = camera_from_part.translation().cast<float>();
+  for (const SilhouetteEdge& edge : silhouette) {
+    const Eigen::Vector3f q0 = turn * mesh.vertices[edge.from] + shift, q1 = turn * mesh.vertices[edge.to] + shift;
+    if (q0.z() <= 1 || q1.z() <= 1) continue;
+    if (edge.height_mm < kSteepest * q0.norm()) continue;
+    const Vec2 a = camera.project(Vec3(q0.cast<double>())), e = camera.project(Vec3(q1.cast<double>()));
     Vec2 along = e - a;
     const double length = along.norm();
     if (length < 1e-6) continue;
     const int count = std::max(1, static_cast<int>(length / render.step));
     const double weight = kSampleWeight * length / count;
     along /= length;
-    Vec2 m(along[1], -along[0]);
-    // Outward: away from the seen facet's third vertex.
-    for (const std::uint32_t k : mesh.triangles[seen]) {
-      if (k == edge.vertices[0] || k == edge.vertices[1]) continue;
-      const Vec2 third = camera.project(Vec3(camera_from_part * mesh.vertices[k].cast<double>()));
-      if (m.dot(third - a) > 0) m = -m;
-    }
+    const Vec2 m(-along[1], along[0]);  // outward: the facet turns left of its edges, seen with y down
+    const double z0 = q0.z(), z1 = q1.z();
+    const Eigen::Vector3d n = rotation * mesh.normals[edge.facet].cast<double>();
+    const double rho = n.dot(q0.cast<double>());
+    const FacetPlane plane(camera, n, rho);
     for (int k = 0; k < count; ++k) {
       const double f = (k + 0.5) / count;
       // Perspective: equal steps on the screen.
-      const double w = (1 - f) / p0.z() + f / p1.z();
+      const double w = (1 - f) / z0 + f / z1;
       const Vec2 q = a + along * (f * length);
       const double z = 1 / w;
       // Seen there, and nothing of the part beyond?
@@ -124,7 +158,7 @@ ContourSums contour_sums(const RenderMesh& mesh, const SceneDepth& scene, const 
       const double margin = 1.2 * render.step;
       if (!rendered(-margin, inside) || std::abs(1 / inside - z) > 0.01 * z) continue;
       if (rendered(margin, outside) && 1 / outside - z < 0.01 * z) continue;
-      const double s = edge_along(scene, q[0], q[1], m, n, rho, reach_px);
+      const double s = edge_along(scene, q[0], q[1], m, plane, reach_px);
       if (!(std::abs(s) <= reach_px)) continue;
       // The edge of something in front is not the part's.
       const Vec2 edge_at = q + m * (s + 0.5);

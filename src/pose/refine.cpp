@@ -184,6 +184,7 @@ Refinement refine_pose(const RenderMesh& mesh, const SceneDepth& scene, const Po
   Refinement out;
   out.camera_from_part = start;
   thread_local IndexRender render;
+  ContourSums edges;
   Pose rendered_at = start;
   // The kernel ends at 3 local sigma (accumulate); the schedule falls below that everywhere.
   const double end_scale = 3 * std::hypot(0.3 * scene.median_sigma_mm, options.cad_sigma_mm);
@@ -195,12 +196,14 @@ Refinement refine_pose(const RenderMesh& mesh, const SceneDepth& scene, const Po
   for (int it = 0; it <= options.iterations; ++it) {
     const bool final_pass = it == options.iterations;
     const Eigen::Vector3d center = out.camera_from_part * Eigen::Vector3d(options.center);
-    // While the pose moves by less than a quarter of a rendered pixel, each pixel keeps its facet.
+    // While the pose moves by less than a quarter of a rendered pixel, each pixel keeps its facet, and each sample of
+    // the outline its edge in the scan: the outline's equations move with the pose.
     const double pixel_mm = options.step_px * center.z() / scene.camera.fx;
     const double moved_mm = it == 0 ? 1e30 : reach_of_motion(rendered_at, out.camera_from_part, options);
     if (moved_mm > 0.25 * pixel_mm) {
       render_index(mesh, scene.camera, out.camera_from_part, options.step_px, render);
       rendered_at = out.camera_from_part;
+      if (options.outlines) edges = contour_sums(mesh, scene, out.camera_from_part, render, Vec3(center), kEdgeReachPx);
     } else {
       move_render(mesh, scene.camera, out.camera_from_part, render);
     }
@@ -221,7 +224,6 @@ Refinement refine_pose(const RenderMesh& mesh, const SceneDepth& scene, const Po
     Vector6 b;
     for (int a = 0; a < 6; ++a) b[a] = sums.b[static_cast<std::size_t>(a)] * independent;
     if (options.outlines) {
-      const ContourSums edges = contour_sums(mesh, scene, out.camera_from_part, render, Vec3(center), kEdgeReachPx);
       const bool settling = it + 2 < options.iterations;
       add_outlines(out.information, b, edges, options.frozen, scale6,
                    settling ? 0 : kOutlineBiasPx * center.z() / scene.camera.fx);
@@ -236,6 +238,7 @@ Refinement refine_pose(const RenderMesh& mesh, const SceneDepth& scene, const Po
     const double reach = 4 * std::max(scale, end_scale);
     if (length > reach) delta *= reach / length;
     out.camera_from_part = moved_about(out.camera_from_part, center, delta);
+    edges.pull -= edges.information * delta;
     scale /= ratio;
     if (length < 1e-5 && scale <= end_scale) {
       // Converged: what is left is the final pass.

@@ -22,7 +22,7 @@ class WorkBudget {
   }
 
   /// A place took so long from its rivals to its winner: to finish what is found will take about as long each.
-  void found_one(double since_ms) { time_to_finish_ms_ += elapsed_ms() - since_ms; }
+  void found_one(double took_ms) { time_to_finish_ms_ += took_ms; }
 
   double elapsed_ms() const { return std::chrono::duration<double, std::milli>(Clock::now() - start_).count(); }
   bool exhausted() const { return exhausted_; }

@@ -2,6 +2,7 @@
 
 #include <vector>
 
+#include "detail.hpp"
 #include "hypotheses.hpp"
 #include "tribin/core/reason.hpp"
 #include "tribin/pose/refine.hpp"
@@ -30,8 +31,8 @@ double covered_pixels(const Part& part, const SceneDepth& scene, const Pose& cam
 /// Render step that leaves about `pixels` of the part.
 int step_for(const Part& part, const SceneDepth& scene, const Pose& camera_from_part, double pixels);
 
-VerificationOptions verification_options(const Part& part, int step_px, double tolerance_mm);
-RefineOptions refine_options(const Part& part, int step_px, int iterations, double start_scale_mm);
+VerificationOptions verification_options(const Part& part, Detail detail, int step_px, double tolerance_mm);
+RefineOptions refine_options(const Part& part, Detail detail, int step_px, int iterations, double start_scale_mm);
 
 /// A direction of the pose that the data holds no better than this [mm at the gyration radius] is weak: 1 % of the
 /// diameter, a fifth of what counts as found. Refinement leaves it alone and the answer tells of it.
@@ -39,7 +40,8 @@ inline double weak_limit_mm(const Part& part) { return 0.01 * part.diameter_mm; 
 
 /// refine_pose, taken back where the scan is less likely at the refined pose than at its start: normals alone let a
 /// part slide along its weak directions, past steps that only its depth shows.
-Refinement refine_guarded(const Part& part, const SceneDepth& scene, const Pose& start, const RefineOptions& options);
+Refinement refine_guarded(const Part& part, Detail detail, const SceneDepth& scene, const Pose& start,
+                          const RefineOptions& options);
 
 /// Where hypotheses come from, cheapest and surest first.
 enum class Source { primitives, point_pairs };

@@ -40,7 +40,7 @@ void add_spins(const SceneDepth& scene, const Part& part, const Pose& pose, std:
   for (const ContinuousSymmetry& axis : part.nearly_round) {
     std::vector<Pose> spins;
     for (int k = 0; k < kSpins; ++k) spins.push_back(turned(pose, axis, 2 * kPi * k / kSpins));
-    std::vector<double> score = render_scores(scene, part, spins, few);
+    std::vector<double> score = render_scores(scene, part, Detail::coarse, spins, few);
     std::vector<int> maxima;
     for (int k = 1; k < kSpins; ++k) {
       const auto at = [&](int i) { return score[static_cast<std::size_t>((i + kSpins) % kSpins)]; };
@@ -56,7 +56,7 @@ void add_spins(const SceneDepth& scene, const Part& part, const Pose& pose, std:
     if (step < few) {
       std::vector<Pose> looked;
       for (const int k : maxima) looked.push_back(spins[static_cast<std::size_t>(k)]);
-      const std::vector<double> finer = render_scores(scene, part, looked, step);
+      const std::vector<double> finer = render_scores(scene, part, Detail::coarse, looked, step);
       for (std::size_t i = 0; i < maxima.size(); ++i) score[static_cast<std::size_t>(maxima[i])] = finer[i];
       best_first();
     }
@@ -80,7 +80,7 @@ void add_spins(const SceneDepth& scene, const Part& part, const Pose& pose, std:
         tried.push_back(angle[i / 2] + (i % 2 ? turn : -turn));
         beside.push_back(turned(pose, axis, tried.back()));
       }
-      const std::vector<double> there = render_scores(scene, part, beside, std::min(step, few));
+      const std::vector<double> there = render_scores(scene, part, Detail::coarse, beside, std::min(step, few));
       for (std::size_t i = 0; i < 2 * keep; ++i)
         if (there[i] > best[i / 2]) {
           best[i / 2] = there[i];
@@ -149,19 +149,19 @@ struct Finalist {
 };
 
 /// Refines every pose at a render step and ranks them, the likeliest first.
-void compare(const SceneDepth& scene, const Part& part, int step, int iterations, double start_mm,
+void compare(const SceneDepth& scene, const Part& part, Detail detail, int step, int iterations, double start_mm,
              std::vector<Finalist>& finalists) {
-  RefineOptions options = refine_options(part, step, iterations, std::max(start_mm, 4 * scene.median_sigma_mm));
+  RefineOptions options = refine_options(part, detail, step, iterations, std::max(start_mm, 4 * scene.median_sigma_mm));
   options.outlines = true;
   parallel_each(static_cast<int>(finalists.size()), [&](int i) {
     Finalist& f = finalists[static_cast<std::size_t>(i)];
-    const Refinement refined = refine_guarded(part, scene, f.pose, options);
+    const Refinement refined = refine_guarded(part, detail, scene, f.pose, options);
     f.pose = refined.camera_from_part;
     f.information = refined.information;
   });
   std::vector<std::pair<const Part*, Pose>> poses;
   for (const Finalist& f : finalists) poses.emplace_back(&part, f.pose);
-  const Ranking ranking = rank_poses(scene, poses, step);
+  const Ranking ranking = rank_poses(scene, detail, poses, step);
   std::vector<Finalist> ranked;
   for (std::size_t i = 0; i < ranking.order.size(); ++i) {
     ranked.push_back(finalists[ranking.order[i]]);
@@ -192,7 +192,7 @@ CellMask mask_of(const Part& part, const SceneDepth& scene, const PoseCandidate&
   const Image<Vec3f>& cells = scene.cell_normal;
   CellMask mask = CellMask::none_of(cells.size());
   IndexRender render;
-  render_index(part.render_mesh, scene.camera, candidate.camera_from_part, scene.cell_px, render);
+  render_index(part.coarse_mesh, scene.camera, candidate.camera_from_part, scene.cell_px, render);
   const double near_mm = 0.02 * part.diameter_mm;
   for (int j = 0; j < render.height; ++j)
     for (int i = 0; i < render.width; ++i) {
@@ -210,12 +210,12 @@ CellMask mask_of(const Part& part, const SceneDepth& scene, const PoseCandidate&
 PoseCandidate settled_on_scan(const SceneDepth& scene, const Part& part, const PoseCandidate& candidate) {
   std::vector<Finalist> one = {{candidate.camera_from_part}};
   const int step = step_for(part, scene, candidate.camera_from_part, kPolishPixels);
-  compare(scene, part, step, 5, 0.012 * part.diameter_mm, one);
+  compare(scene, part, Detail::coarse, step, 5, 0.012 * part.diameter_mm, one);
   PoseCandidate out = candidate;
   out.camera_from_part = one[0].pose;
   out.information = one[0].information;
-  out.verification =
-      verify_pose(part.render_mesh, scene, one[0].pose, verification_options(part, step, 0.002 * part.diameter_mm));
+  out.verification = verify_pose(part.coarse_mesh, scene, one[0].pose,
+                                 verification_options(part, Detail::coarse, step, 0.002 * part.diameter_mm));
   return out;
 }
 
@@ -261,12 +261,12 @@ Polished polish_once(const SceneDepth& scene, std::span<const Part> parts, const
     const auto k = static_cast<std::size_t>(i);
     if (k > 0) {
       const double start = std::max(0.012 * part.diameter_mm, noise);
-      RefineOptions options = refine_options(part, few, 3, start);
+      RefineOptions options = refine_options(part, Detail::coarse, few, 3, start);
       options.outlines = true;
-      poses[k] = refine_guarded(part, scene, poses[k], options).camera_from_part;
+      poses[k] = refine_guarded(part, Detail::coarse, scene, poses[k], options).camera_from_part;
     }
-    checks[k] =
-        verify_pose(part.render_mesh, scene, poses[k], verification_options(part, few, 0.004 * part.diameter_mm));
+    checks[k] = verify_pose(part.coarse_mesh, scene, poses[k],
+                            verification_options(part, Detail::coarse, few, 0.004 * part.diameter_mm));
   });
   const auto leader = std::max_element(checks.begin(), checks.end(),
                                        [](const Verification& a, const Verification& b) { return a.gain < b.gain; });
@@ -300,7 +300,7 @@ Polished polish_once(const SceneDepth& scene, std::span<const Part> parts, const
     finalists.push_back({poses[k]});
     kept.emplace_back(&part, poses[k]);
   }
-  const std::vector<double> likelihood = log_likelihoods(scene, kept, few);
+  const std::vector<double> likelihood = log_likelihoods(scene, Detail::coarse, kept, few);
   for (std::size_t i = 0; i < finalists.size(); ++i) finalists[i].log_likelihood = likelihood[i];
   std::stable_sort(finalists.begin(), finalists.end(),
                    [](const Finalist& a, const Finalist& b) { return a.log_likelihood > b.log_likelihood; });
@@ -312,19 +312,19 @@ Polished polish_once(const SceneDepth& scene, std::span<const Part> parts, const
 
   // Fine: the survivors on more pixels, compared by likelihood; those that stay near the best once more on all pixels.
   const int fine = step_for(part, scene, settled.camera_from_part, kPolishPixels);
-  if (finalists.size() > 1) compare(scene, part, fine, 5, 0.012 * part.diameter_mm, finalists);
+  if (finalists.size() > 1) compare(scene, part, Detail::coarse, fine, 5, 0.012 * part.diameter_mm, finalists);
   std::erase_if(finalists, [best = finalists[0].log_likelihood](const Finalist& f) {
     return f.log_likelihood < best - kUndecided;
   });
   if (finalists.size() > 1)
-    compare(scene, part, step_for(part, scene, settled.camera_from_part, kDecidePixels), 2, 0, finalists);
+    compare(scene, part, Detail::full, step_for(part, scene, settled.camera_from_part, kDecidePixels), 2, 0, finalists);
 
   Polished out;
   out.candidate = settled;
   out.candidate.camera_from_part = finalists[0].pose;
   if (finalists[0].information != Matrix6::Zero()) out.candidate.information = finalists[0].information;
   out.candidate.verification = verify_pose(part.render_mesh, scene, finalists[0].pose,
-                                           verification_options(part, fine, 0.002 * part.diameter_mm));
+                                           verification_options(part, Detail::full, fine, 0.002 * part.diameter_mm));
   out.mask = mask_of(part, scene, out.candidate);
   const auto same = [&](const Pose& a, const Pose& b) {
     return close_poses(part, a, b, 0.02 * part.diameter_mm, 4 * kDegree);
@@ -363,16 +363,18 @@ void decide_again(const SceneDepth& scene, std::span<const Part> parts, const Ce
   const Part& part = parts[static_cast<std::size_t>(polished.candidate.part)];
   std::vector<std::pair<const Part*, Pose>> poses = {{&part, polished.candidate.camera_from_part}};
   for (const auto& [pose, log_odds] : polished.others) poses.emplace_back(&part, pose);
-  const Ranking ranking = rank_again(scene, poses, step_for(part, scene, poses[0].second, kDecidePixels), elsewhere);
+  const Ranking ranking =
+      rank_again(scene, Detail::full, poses, step_for(part, scene, poses[0].second, kDecidePixels), elsewhere);
   polished.others.clear();
   for (std::size_t i = 1; i < ranking.order.size(); ++i)
     polished.others.emplace_back(poses[ranking.order[i]].second, ranking.log_odds[i]);
   if (ranking.order[0] == 0) return;
   PoseCandidate& c = polished.candidate;
   c.camera_from_part = poses[ranking.order[0]].second;
-  c.verification = verify_pose(
-      part.render_mesh, scene, c.camera_from_part,
-      verification_options(part, step_for(part, scene, c.camera_from_part, kPolishPixels), 0.002 * part.diameter_mm));
+  c.verification =
+      verify_pose(part.render_mesh, scene, c.camera_from_part,
+                  verification_options(part, Detail::full, step_for(part, scene, c.camera_from_part, kPolishPixels),
+                                       0.002 * part.diameter_mm));
   polished.mask = mask_of(part, scene, c);
 }
 

@@ -17,11 +17,11 @@ struct Renders {
   std::vector<IndexRender> of;
   int u0 = 0, v0 = 0, u1 = -1, v1 = -1;  ///< first and last pixel
 
-  Renders(const SceneDepth& scene, std::span<const std::pair<const Part*, Pose>> poses, int step_px) {
+  Renders(const SceneDepth& scene, Detail detail, std::span<const std::pair<const Part*, Pose>> poses, int step_px) {
     of.resize(poses.size());
     parallel_each(static_cast<int>(poses.size()), [&](int i) {
       const auto k = static_cast<std::size_t>(i);
-      render_index(poses[k].first->render_mesh, scene.camera, poses[k].second, step_px, of[k]);
+      render_index(mesh_of(*poses[k].first, detail), scene.camera, poses[k].second, step_px, of[k]);
     });
     u0 = scene.camera.width, v0 = scene.camera.height;
     for (const IndexRender& r : of) {
@@ -74,11 +74,11 @@ double common_error_mm(const std::vector<double>& means, const std::vector<doubl
 
 }  // namespace
 
-std::vector<double> log_likelihoods(const SceneDepth& scene, std::span<const std::pair<const Part*, Pose>> poses,
-                                    int step_px) {
+std::vector<double> log_likelihoods(const SceneDepth& scene, Detail detail,
+                                    std::span<const std::pair<const Part*, Pose>> poses, int step_px) {
   // All poses are judged on the union of their windows: what one explains and another does not counts against the
   // other.
-  const Renders renders(scene, poses, step_px);
+  const Renders renders(scene, detail, poses, step_px);
   std::vector<double> out(poses.size(), 0.0);
   for (int v = renders.v0; v <= renders.v1; v += step_px)
     for (int u = renders.u0; u <= renders.u1; u += step_px) {
@@ -91,7 +91,7 @@ std::vector<double> log_likelihoods(const SceneDepth& scene, std::span<const std
       }
       if (!any) continue;
       for (std::size_t k = 0; k < poses.size(); ++k)
-        out[k] -= prediction(scene, renders.of[k], poses[k].first->mesh.chord_error_mm, u, v, z).cost();
+        out[k] -= prediction(scene, renders.of[k], cad_sigma_mm(*poses[k].first, detail), u, v, z).cost();
     }
   // Pixels closer than the noise's correlation tell the same story.
   const double inflation = std::max(1.0, correlation_inflation(scene.correlation_px) / (double(step_px) * step_px));
@@ -99,7 +99,8 @@ std::vector<double> log_likelihoods(const SceneDepth& scene, std::span<const std
   return out;
 }
 
-std::vector<double> log_odds(const SceneDepth& scene, std::span<const std::pair<const Part*, Pose>> poses, int step_px,
+std::vector<double> log_odds(const SceneDepth& scene, Detail detail,
+                             std::span<const std::pair<const Part*, Pose>> poses, int step_px,
                              const CellMask& elsewhere) {
   // Votes are counted by patches of the image: mirrored light, a burr, an edge a fraction of a pixel off move whole
   // patches, of either sign. So a patch counts at most 8 nats, and the sum counts beyond 1.5 sd of what the same votes
@@ -110,12 +111,12 @@ std::vector<double> log_odds(const SceneDepth& scene, std::span<const std::pair<
   constexpr double kMostOfPatch = 8, kChance = 1.5;
   std::vector<double> out(poses.size(), 0.0);
   if (poses.size() < 2) return out;
-  const Renders renders(scene, poses, step_px);
+  const Renders renders(scene, detail, poses, step_px);
   const double inflation = std::max(1.0, correlation_inflation(scene.correlation_px) / (double(step_px) * step_px));
   const int width = (renders.u1 - renders.u0) / step_px + 1, height = (renders.v1 - renders.v0) / step_px + 1;
   const int patches_x = (width + kPatch - 1) / kPatch, patches_y = (height + kPatch - 1) / kPatch;
   const auto look = [&](std::size_t k, int i, int j, float z) {
-    return prediction(scene, renders.of[k], poses[k].first->mesh.chord_error_mm, renders.u0 + i * step_px,
+    return prediction(scene, renders.of[k], cad_sigma_mm(*poses[k].first, detail), renders.u0 + i * step_px,
                       renders.v0 + j * step_px, z);
   };
   const auto depth = [&](int i, int j) { return scene.z_mm(renders.u0 + i * step_px, renders.v0 + j * step_px); };
@@ -194,8 +195,8 @@ void sort_by(const std::vector<double>& value, std::vector<std::size_t>& order) 
 
 }  // namespace
 
-Ranking rank_again(const SceneDepth& scene, std::span<const std::pair<const Part*, Pose>> poses, int step_px,
-                   const CellMask& elsewhere) {
+Ranking rank_again(const SceneDepth& scene, Detail detail, std::span<const std::pair<const Part*, Pose>> poses,
+                   int step_px, const CellMask& elsewhere) {
   Ranking out;
   out.order.resize(poses.size());
   std::iota(out.order.begin(), out.order.end(), std::size_t{0});
@@ -205,7 +206,7 @@ Ranking rank_again(const SceneDepth& scene, std::span<const std::pair<const Part
   for (int i = 0; i < kChanges; ++i) {
     std::vector<std::pair<const Part*, Pose>> ordered;
     for (const std::size_t k : out.order) ordered.push_back(poses[k]);
-    const std::vector<double> odds = log_odds(scene, ordered, step_px, elsewhere);
+    const std::vector<double> odds = log_odds(scene, detail, ordered, step_px, elsewhere);
     std::vector<double> value(poses.size());
     for (std::size_t k = 0; k < odds.size(); ++k) value[out.order[k]] = odds[k];
     const std::size_t leader = out.order[0];
@@ -219,13 +220,14 @@ Ranking rank_again(const SceneDepth& scene, std::span<const std::pair<const Part
   return out;
 }
 
-Ranking rank_poses(const SceneDepth& scene, std::span<const std::pair<const Part*, Pose>> poses, int step_px) {
+Ranking rank_poses(const SceneDepth& scene, Detail detail, std::span<const std::pair<const Part*, Pose>> poses,
+                   int step_px) {
   std::vector<std::size_t> order(poses.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
-  sort_by(log_likelihoods(scene, poses, step_px), order);
+  sort_by(log_likelihoods(scene, detail, poses, step_px), order);
   std::vector<std::pair<const Part*, Pose>> ordered;
   for (const std::size_t k : order) ordered.push_back(poses[k]);
-  Ranking out = rank_again(scene, ordered, step_px, {});
+  Ranking out = rank_again(scene, detail, ordered, step_px, {});
   for (std::size_t& k : out.order) k = order[k];
   return out;
 }

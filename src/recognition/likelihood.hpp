@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "cell_mask.hpp"
-#include "tribin/part/part.hpp"
+#include "detail.hpp"
 #include "tribin/pose/scene_depth.hpp"
 
 namespace tribin {
@@ -13,8 +13,8 @@ namespace tribin {
 /// Log-likelihood of the scan where any of the poses predicts something: each pixel's residual in its local sigma,
 /// bounded at 4 sigma, over the equivalent number of independent pixels. Only differences between poses mean something.
 /// It ranks poses; how sure the first one is, `log_odds` tells.
-std::vector<double> log_likelihoods(const SceneDepth& scene, std::span<const std::pair<const Part*, Pose>> poses,
-                                    int step_px);
+std::vector<double> log_likelihoods(const SceneDepth& scene, Detail detail,
+                                    std::span<const std::pair<const Part*, Pose>> poses, int step_px);
 
 /// Log of the odds of each pose against the first, from the pixels that tell the two apart: those where they predict
 /// places that differ by more than the noise and four times what errors common to whole faces amount to (estimated from
@@ -25,7 +25,8 @@ std::vector<double> log_likelihoods(const SceneDepth& scene, std::span<const std
 /// \return one for each pose; 0 for the first.
 /// \source ours: "the discriminating patches" of the design notes, section 9. Residuals on all pixels let the pose win
 ///         that fits the sensor's smooth errors best: on simulated heaps a wrong pulley by 50 nats.
-std::vector<double> log_odds(const SceneDepth& scene, std::span<const std::pair<const Part*, Pose>> poses, int step_px,
+std::vector<double> log_odds(const SceneDepth& scene, Detail detail,
+                             std::span<const std::pair<const Part*, Pose>> poses, int step_px,
                              const CellMask& elsewhere = {});
 
 /// Poses by how likely they are, the likeliest first: the leader on all pixels, unless the pixels that tell prefer
@@ -34,11 +35,12 @@ struct Ranking {
   std::vector<std::size_t> order;  ///< indices into the poses
   std::vector<double> log_odds;    ///< of order[i] against order[0], at most 0
 };
-Ranking rank_poses(const SceneDepth& scene, std::span<const std::pair<const Part*, Pose>> poses, int step_px);
+Ranking rank_poses(const SceneDepth& scene, Detail detail, std::span<const std::pair<const Part*, Pose>> poses,
+                   int step_px);
 
 /// The same of poses that are ranked already: only the pixels that tell are asked again.
 /// \param elsewhere  as for log_odds.
-Ranking rank_again(const SceneDepth& scene, std::span<const std::pair<const Part*, Pose>> poses, int step_px,
-                   const CellMask& elsewhere);
+Ranking rank_again(const SceneDepth& scene, Detail detail, std::span<const std::pair<const Part*, Pose>> poses,
+                   int step_px, const CellMask& elsewhere);
 
 }  // namespace tribin

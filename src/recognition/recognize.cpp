@@ -3,10 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "budget.hpp"
-#include "choice.hpp"
 #include "instance_report.hpp"
-#include "likelihood.hpp"
+#include "selection.hpp"
 #include "tribin/core/error.hpp"
 #include "tribin/core/parallel.hpp"
 #include "tribin/pose/index_render.hpp"
@@ -17,18 +15,9 @@
 namespace tribin {
 namespace {
 
-// Two candidates that explain more than this share of the smaller one's cells cannot both be there: touching parts
-// share only cells along their common edge.
-constexpr double kOverlap = 0.3;
-
 // Given out is what is more likely right than wrong, in full pose; a place that is sure but not which of its
 // self-similar poses is told apart from them.
 constexpr double kGivenOut = 0.5;
-
-double overlap(const CellMask& a, const CellMask& b) {
-  const int smaller = std::min(a.count, b.count);
-  return smaller > 0 ? double(a.shared(b)) / smaller : 0;
-}
 
 /// Probability that an accepted verification is right in place and class. \source ours: a logistic of the support, the
 /// outline's breaks, the share that is measured, and how much outline there is (pixels of the polish's render, a
@@ -78,10 +67,11 @@ Instance make_instance(const Polished& p, std::span<const Part> parts, const Sce
   // the noise is so correlated that its neighbours repeat it (neighbour correlation over 0.6).
   const int step =
       std::max(scene.correlation_px >= 0.7 ? 2 : 1, step_for(part, scene, p.candidate.camera_from_part, 60000));
-  RefineOptions options = refine_options(part, step, 3, std::max(0.002 * part.diameter_mm, 4 * scene.median_sigma_mm));
+  RefineOptions options =
+      refine_options(part, Detail::full, step, 3, std::max(0.002 * part.diameter_mm, 4 * scene.median_sigma_mm));
   options.outlines = true;
   options.frozen = free_directions_about_center(part, p.candidate.camera_from_part);
-  Refinement refined = refine_guarded(part, scene, p.candidate.camera_from_part, options);
+  Refinement refined = refine_guarded(part, Detail::full, scene, p.candidate.camera_from_part, options);
   settle_weak_directions(part, scene, options.frozen,
                          std::max(step, step_for(part, scene, p.candidate.camera_from_part, 10000)), refined);
   out.camera_from_part = refined.camera_from_part;
@@ -138,142 +128,6 @@ void name_neighbours(std::span<const Part> parts, Instances& found) {
   }
 }
 
-/// Poses that were looked at closely and refused: later rounds need not look again, since what is refused by its own
-/// surface and outline is so whatever else the scan holds.
-struct Refused {
-  std::vector<PoseCandidate> candidates;
-
-  bool holds(std::span<const Part> parts, const PoseCandidate& c) const {
-    const Part& part = parts[static_cast<std::size_t>(c.part)];
-    return std::any_of(candidates.begin(), candidates.end(), [&](const PoseCandidate& r) {
-      return r.part == c.part &&
-             close_poses(part, r.camera_from_part, c.camera_from_part, 0.015 * part.diameter_mm, 3 * kDegree);
-    });
-  }
-};
-
-/// What stands already. Two of a part cannot stand in one place, in whatever turn: not nearer than the thinnest sheets
-/// nest, a fiftieth of their diameter.
-struct Standing {
-  std::vector<PoseCandidate> candidates;
-
-  bool in_place_of(std::span<const Part> parts, const PoseCandidate& c) const {
-    const Part& part = parts[static_cast<std::size_t>(c.part)];
-    return std::any_of(candidates.begin(), candidates.end(), [&](const PoseCandidate& s) {
-      return s.part == c.part && (place_of(part, s) - place_of(part, c)).norm() < 0.02 * part.diameter_mm;
-    });
-  }
-};
-
-/// Share of the cells a pose explains that are no background: a face that lies in a wall or a floor is seen nowhere.
-double own_share(const CellMask& mask, const Image<std::uint8_t>& background) {
-  if (mask.count == 0) return 0;
-  int own = 0;
-  for (std::size_t i = 0; i < background.size(); ++i) own += mask.holds(i) && !background.data[i];
-  return double(own) / mask.count;
-}
-
-/// Best first: each place of the scan goes to the pose, of any part, that explains it best.
-/// \param stands  what earlier rounds found; grows.
-std::vector<Polished> choose(const SceneFeatures& features, const SceneDepth& scene, std::span<const Part> parts,
-                             std::vector<PoseCandidate> candidates, Standing& stands, Refused& refused,
-                             WorkBudget& budget, std::vector<Reason>& rejected) {
-  std::erase_if(candidates, [&](const PoseCandidate& c) { return refused.holds(parts, c); });
-  std::stable_sort(candidates.begin(), candidates.end(), [](const PoseCandidate& a, const PoseCandidate& b) {
-    return a.verification.gain > b.verification.gain;
-  });
-  std::vector<CellMask> masks(candidates.size());
-  parallel_each(static_cast<int>(candidates.size()), [&](int i) {
-    const auto k = static_cast<std::size_t>(i);
-    masks[k] = mask_of(parts[static_cast<std::size_t>(candidates[k].part)], scene, candidates[k]);
-  });
-  CellMask claimed = features.claimed;  // and by this round's winners
-  std::vector<Polished> winners;
-  std::vector<bool> done(candidates.size(), false);
-  for (std::size_t i = 0; i < candidates.size(); ++i) {
-    if (done[i]) continue;
-    if (candidates[i].verification.gain <= 0) break;  // more speaks against it and all that follow than for them
-    if (masks[i].count == 0 || overlap(claimed, masks[i]) > kOverlap || stands.in_place_of(parts, candidates[i])) {
-      done[i] = true;
-      const Part& part = parts[static_cast<std::size_t>(candidates[i].part)];
-      add_reason(rejected, {part.name, "selection", "overlap", overlap(claimed, masks[i]), kOverlap, 1,
-                            place_of(part, candidates[i])});
-      continue;
-    }
-    if (!budget.take()) break;
-    const double begun_ms = budget.elapsed_ms();
-    // The rivals for this place: the best two of each part that are not far behind, and as many more poses as the
-    // polish can look at.
-    constexpr int kLookedAt = 6;
-    std::vector<std::size_t> rivals;
-    std::vector<int> taken(parts.size(), 0);
-    std::vector<std::vector<Pose>> also(parts.size());  // what else was found here, of each part
-    for (std::size_t k = i; k < candidates.size(); ++k) {
-      if (done[k] || candidates[k].verification.gain < 0.8 * candidates[i].verification.gain) continue;
-      const auto of = static_cast<std::size_t>(candidates[k].part);
-      if (taken[of] >= kLookedAt || (k != i && overlap(masks[i], masks[k]) < 0.5)) continue;
-      if (++taken[of] > 1) also[of].push_back(candidates[k].camera_from_part);
-      if (taken[of] <= 2) rivals.push_back(k);
-    }
-    for (const std::size_t k : rivals) done[k] = true;
-    std::erase_if(rivals, [&](std::size_t k) {
-      if (hopeful(parts[static_cast<std::size_t>(candidates[k].part)], candidates[k], rejected)) return false;
-      refused.candidates.push_back(candidates[k]);
-      return true;
-    });
-    std::vector<PoseCandidate> settled(rivals.size());
-    parallel_each(static_cast<int>(rivals.size()), [&](int r) {
-      const PoseCandidate& c = candidates[rivals[static_cast<std::size_t>(r)]];
-      settled[static_cast<std::size_t>(r)] = settled_on_scan(scene, parts[static_cast<std::size_t>(c.part)], c);
-    });
-    std::vector<Polished> polished;
-    for (std::size_t r = 0; r < rivals.size(); ++r) {
-      const PoseCandidate& c = settled[r];
-      const bool twin =
-          std::any_of(polished.begin(), polished.end(), [&](const Polished& p) { return p.candidate.part == c.part; });
-      if (plausible(parts[static_cast<std::size_t>(c.part)], c, rejected)) {
-        // Of one part, the polish itself tries the poses that are mistaken for each other.
-        if (!twin) polished.push_back(polish(scene, parts, c, also[static_cast<std::size_t>(c.part)]));
-      } else {
-        refused.candidates.push_back(candidates[rivals[r]]);
-      }
-    }
-    if (polished.empty()) continue;
-    std::vector<std::pair<const Part*, Pose>> poses;
-    for (const Polished& p : polished)
-      poses.emplace_back(&parts[static_cast<std::size_t>(p.candidate.part)], p.candidate.camera_from_part);
-    const Ranking ranking = rank_poses(scene, poses, step_for(*poses[0].first, scene, poses[0].second, 6000));
-    const std::size_t best = ranking.order[0];
-    Polished& winner = polished[best];
-    const Part& part = parts[static_cast<std::size_t>(winner.candidate.part)];
-    const auto own_surface = [&] {
-      const double own =
-          winner.candidate.verification.measured_fraction() * own_share(winner.mask, background_cells(features, part));
-      if (own < kLeastMeasured)
-        add_reason(rejected, {part.name, "verification", "own_surface", own, kLeastMeasured, 1,
-                              place_of(part, winner.candidate)});
-      return own >= kLeastMeasured;
-    };
-    if (!acceptable(part, winner.candidate, rejected) || !own_surface() ||
-        stands.in_place_of(parts, winner.candidate)) {
-      for (const std::size_t k : rivals) refused.candidates.push_back(candidates[k]);
-      continue;
-    }
-    for (std::size_t r = 1; r < ranking.order.size(); ++r) {
-      const Polished& loser = polished[ranking.order[r]];
-      const Part& other = parts[static_cast<std::size_t>(loser.candidate.part)];
-      winner.class_odds += std::exp(ranking.log_odds[r]);
-      add_reason(rejected,
-                 {other.name, "selection", "log_odds", ranking.log_odds[r], 0, 1, place_of(other, loser.candidate)});
-    }
-    claimed.join(winner.mask);
-    stands.candidates.push_back(winner.candidate);
-    winners.push_back(std::move(winner));
-    budget.found_one(begun_ms);
-  }
-  return winners;
-}
-
 /// The cells that are not flagged.
 CellMask all_but(const Image<std::uint8_t>& flags) {
   CellMask out = CellMask::none_of(flags.size());
@@ -323,7 +177,7 @@ Instances recognize(const Primitives& primitives, const PrimitiveModel& observat
         candidates.insert(candidates.end(), of_part.begin(), of_part.end());
       }
       std::vector<Polished> winners =
-          choose(features, scene, parts, std::move(candidates), stands, refused, budget, out.rejected);
+          choose_winners(features, scene, parts, std::move(candidates), stands, refused, budget, out.rejected);
       for (Polished& w : winners) {
         claim_cells(features, w.mask);
         found.push_back(std::move(w));
@@ -335,8 +189,14 @@ Instances recognize(const Primitives& primitives, const PrimitiveModel& observat
   out.work_done = budget.done();
   decide_together(scene, parts, found);
   CellMask told;  // cells of the parts that are told of; what is kept back explains nothing
-  for (const Polished& p : found) {
-    Instance instance = make_instance(p, parts, scene, surfels.scan->noise, options);
+  std::vector<Instance> made(found.size());
+  parallel_each(static_cast<int>(found.size()), [&](int i) {
+    const auto k = static_cast<std::size_t>(i);
+    made[k] = make_instance(found[k], parts, scene, surfels.scan->noise, options);
+  });
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    const Polished& p = found[i];
+    Instance& instance = made[i];
     const auto kept_back = [&](const char* test, double value, double limit) {
       add_reason(out.rejected, {instance.part, "acceptance", test, value, limit, 1,
                                 place_of(parts[static_cast<std::size_t>(p.candidate.part)], p.candidate)});

@@ -50,14 +50,14 @@ double sum_of(const SceneDepth& scene, const IndexRender& render, double chord_e
 }
 
 template <typename Worth>
-std::vector<double> sums_of(const SceneDepth& scene, const Part& part, std::span<const Pose> poses, int step_px,
-                            const Worth& worth) {
+std::vector<double> sums_of(const SceneDepth& scene, const Part& part, Detail detail, std::span<const Pose> poses,
+                            int step_px, const Worth& worth) {
   std::vector<double> out(poses.size());
   parallel_each(static_cast<int>(poses.size()), [&](int i) {
     const auto k = static_cast<std::size_t>(i);
     thread_local IndexRender render;
-    render_index(part.render_mesh, scene.camera, poses[k], step_px, render);
-    out[k] = sum_of(scene, render, part.mesh.chord_error_mm, worth);
+    render_index(mesh_of(part, detail), scene.camera, poses[k], step_px, render);
+    out[k] = sum_of(scene, render, cad_sigma_mm(part, detail), worth);
   });
   // Pixels closer than the noise's correlation tell the same story.
   const double inflation = std::max(1.0, correlation_inflation(scene.correlation_px) / (double(step_px) * step_px));
@@ -67,16 +67,17 @@ std::vector<double> sums_of(const SceneDepth& scene, const Part& part, std::span
 
 }  // namespace
 
-std::vector<double> render_scores(const SceneDepth& scene, const Part& part, std::span<const Pose> poses, int step_px) {
-  return sums_of(scene, part, poses, step_px,
+std::vector<double> render_scores(const SceneDepth& scene, const Part& part, Detail detail, std::span<const Pose> poses,
+                                  int step_px) {
+  return sums_of(scene, part, detail, poses, step_px,
                  [](float half_square, float) { return kUnexplained - std::min(kUnexplained, half_square); });
 }
 
-std::vector<double> contradictions(const SceneDepth& scene, const Part& part, std::span<const Pose> poses,
-                                   int step_px) {
+std::vector<double> contradictions(const SceneDepth& scene, const Part& part, Detail detail,
+                                   std::span<const Pose> poses, int step_px) {
   const auto near = static_cast<float>(0.03 * part.diameter_mm);
   constexpr float kNoise = 0.5f * 9;  // 3 sigma
-  return sums_of(scene, part, poses, step_px, [near](float half_square, float error) {
+  return sums_of(scene, part, detail, poses, step_px, [near](float half_square, float error) {
     return half_square < kNoise || error < -near ? 0 : std::min(kUnexplained, half_square);
   });
 }

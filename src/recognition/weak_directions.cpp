@@ -26,10 +26,10 @@ class Profile {
   Pose at(double offset) const { return moved_about(pose_, center_, Vector6(delta_ * offset)); }
 
   std::vector<double> likelihood(std::span<const double> offsets) const {
-    return render_scores(scene_, part_, poses_at(offsets), step_px_);
+    return render_scores(scene_, part_, Detail::full, poses_at(offsets), step_px_);
   }
   std::vector<double> against(std::span<const double> offsets) const {
-    return contradictions(scene_, part_, poses_at(offsets), step_px_);
+    return contradictions(scene_, part_, Detail::full, poses_at(offsets), step_px_);
   }
 
  private:

@@ -41,6 +41,8 @@ struct Part {
   std::string name;
   Mesh mesh;
   RenderMesh render_mesh;
+  RenderMesh coarse_mesh;      ///< of fewer triangles, for looks at few pixels
+  double coarse_error_mm = 0;  ///< its largest distance from the mesh: a thousandth of the diameter
   PrimitiveModel model;
   std::vector<double> exposed_mm2;  ///< of each primitive: projected area, mean over all views (0 = never seen)
   std::vector<std::int32_t> primitive_of_triangle;  ///< primitive id, 0 = none
