@@ -10,57 +10,96 @@
 namespace tribin {
 namespace {
 
-constexpr double kUnexplained = 0.5 * 16;  // 4 sigma, and what a pixel costs that no surface explains
+constexpr float kUnexplained = 0.5f * 16;  // 4 sigma, and what a pixel costs that no surface explains
 
-/// Renders of several poses on one raster of pixels, and their common window.
-struct Renders {
-  std::vector<IndexRender> of;
-  int u0 = 0, v0 = 0, u1 = -1, v1 = -1;  ///< first and last pixel
+/// What a rendered pose says of the pixels that are measured.
+struct Prediction {
+  int u0 = 0, v0 = 0, width = 0, height = 0;
+  int i0 = 0, j0 = 0;           ///< its first pixel in the common window
+  std::vector<float> error_mm;  ///< measured minus predicted, along the surface's normal; > 0 behind it
+  std::vector<float> sigma_mm;  ///< 0 = nothing measured, or no surface there
+};
 
-  Renders(const SceneDepth& scene, Detail detail, std::span<const std::pair<const Part*, Pose>> poses, int step_px) {
-    of.resize(poses.size());
+Prediction predict(const SceneDepth& scene, const Part& part, Detail detail, const Pose& pose, int step_px) {
+  thread_local IndexRender render;
+  render_index(mesh_of(part, detail), scene.camera, pose, step_px, render);
+  Prediction out;
+  out.u0 = render.u0, out.v0 = render.v0, out.width = render.width, out.height = render.height;
+  out.error_mm.assign(render.triangle.size(), 0);
+  out.sigma_mm.assign(render.triangle.size(), 0);
+  const auto cad_sigma = static_cast<float>(cad_sigma_mm(part, detail));
+  for (int j = 0; j < render.height; ++j) {
+    const int v = render.v0 + j * step_px;
+    const auto ry = static_cast<float>((v - scene.camera.cy) / scene.camera.fy);
+    for (int i = 0; i < render.width; ++i) {
+      const std::size_t k = render.index(i, j);
+      if (render.triangle[k] < 0) continue;
+      const int u = render.u0 + i * step_px;
+      const float z = scene.z_mm(u, v);
+      if (!(z > 0)) continue;
+      const auto rx = static_cast<float>((u - scene.camera.cx) / scene.camera.fx);
+      const Vec3f& n = render.normal[static_cast<std::size_t>(render.triangle[k])];
+      const float slant = std::max(0.2f, std::abs(n[0] * rx + n[1] * ry + n[2]));
+      const float sigma = scene.sigma_mm(u, v) * slant;
+      out.error_mm[k] = (z - 1 / render.inverse_z[k]) * slant;
+      out.sigma_mm[k] = std::sqrt(sigma * sigma + cad_sigma * cad_sigma);
+    }
+  }
+  return out;
+}
+
+/// Predictions of several poses on one raster of pixels, and their common window.
+struct Predictions {
+  std::vector<Prediction> of;
+  int u0 = 0, v0 = 0, width = 0, height = 0, step_px = 1;
+
+  Predictions(const SceneDepth& scene, Detail detail, std::span<const std::pair<const Part*, Pose>> poses, int step)
+      : of(poses.size()), step_px(step) {
     parallel_each(static_cast<int>(poses.size()), [&](int i) {
       const auto k = static_cast<std::size_t>(i);
-      render_index(mesh_of(*poses[k].first, detail), scene.camera, poses[k].second, step_px, of[k]);
+      of[k] = predict(scene, *poses[k].first, detail, poses[k].second, step);
     });
     u0 = scene.camera.width, v0 = scene.camera.height;
-    for (const IndexRender& r : of) {
-      if (r.width == 0) continue;
-      u0 = std::min(u0, r.u0);
-      v0 = std::min(v0, r.v0);
-      u1 = std::max(u1, r.u0 + (r.width - 1) * step_px);
-      v1 = std::max(v1, r.v0 + (r.height - 1) * step_px);
+    int u1 = -1, v1 = -1;
+    for (const Prediction& p : of) {
+      if (p.width == 0) continue;
+      u0 = std::min(u0, p.u0);
+      v0 = std::min(v0, p.v0);
+      u1 = std::max(u1, p.u0 + (p.width - 1) * step);
+      v1 = std::max(v1, p.v0 + (p.height - 1) * step);
+    }
+    if (u1 < u0) return;
+    width = (u1 - u0) / step + 1;
+    height = (v1 - v0) / step + 1;
+    for (Prediction& p : of) {
+      p.i0 = (p.u0 - u0) / step;
+      p.j0 = (p.v0 - v0) / step;
     }
   }
 };
 
-/// What a rendered pose says of a pixel that is measured.
-struct Prediction {
-  bool any = false;     ///< a surface is there
-  double error_mm = 0;  ///< measured minus predicted, along the surface's normal; > 0 behind it
-  double sigma_mm = 1;
-  double slant = 1;  ///< of z to the normal
+/// What one prediction says of a pixel.
+struct Look {
+  bool any = false;  ///< a surface is there
+  float error_mm = 0, sigma_mm = 1;
 
-  double cost() const {
+  /// \param i, j  of the common window
+  Look(const Prediction& p, int i, int j) {
+    i -= p.i0, j -= p.j0;
+    if (i < 0 || j < 0 || i >= p.width || j >= p.height) return;
+    const std::size_t at =
+        static_cast<std::size_t>(j) * static_cast<std::size_t>(p.width) + static_cast<std::size_t>(i);
+    if (!(p.sigma_mm[at] > 0)) return;
+    any = true;
+    error_mm = p.error_mm[at];
+    sigma_mm = p.sigma_mm[at];
+  }
+  float cost() const {
     if (!any) return kUnexplained;
-    const double e = error_mm / sigma_mm;
-    return std::min(0.5 * e * e, kUnexplained);
+    const float e = error_mm / sigma_mm;
+    return std::min(0.5f * e * e, kUnexplained);
   }
 };
-
-Prediction prediction(const SceneDepth& scene, const IndexRender& r, double chord_error_mm, int u, int v, float z) {
-  Prediction out;
-  const int i = (u - r.u0) / r.step, j = (v - r.v0) / r.step;
-  if (u < r.u0 || v < r.v0 || i >= r.width || j >= r.height) return out;
-  const std::int32_t triangle = r.triangle[r.index(i, j)];
-  if (triangle < 0) return out;
-  const Vec3 ray = scene.camera.ray(u, v);
-  out.any = true;
-  out.slant = std::max(0.2, std::abs(r.normal[static_cast<std::size_t>(triangle)].cast<double>().dot(ray)));
-  out.sigma_mm = std::hypot(scene.sigma_mm(u, v) * out.slant, chord_error_mm);
-  out.error_mm = (z - 1.0 / r.inverse_z[r.index(i, j)]) * out.slant;
-  return out;
-}
 
 /// Sd of what is common to a patch beyond the noise: errors of the sensor's shape, of the casting [mm].
 double common_error_mm(const std::vector<double>& means, const std::vector<double>& variances) {
@@ -78,21 +117,28 @@ std::vector<double> log_likelihoods(const SceneDepth& scene, Detail detail,
                                     std::span<const std::pair<const Part*, Pose>> poses, int step_px) {
   // All poses are judged on the union of their windows: what one explains and another does not counts against the
   // other.
-  const Renders renders(scene, detail, poses, step_px);
+  const Predictions all(scene, detail, poses, step_px);
   std::vector<double> out(poses.size(), 0.0);
-  for (int v = renders.v0; v <= renders.v1; v += step_px)
-    for (int u = renders.u0; u <= renders.u1; u += step_px) {
-      const float z = scene.z_mm(u, v);
-      if (!(z > 0)) continue;
-      bool any = false;
-      for (const IndexRender& r : renders.of) {
-        const int i = (u - r.u0) / step_px, j = (v - r.v0) / step_px;
-        any = any || (u >= r.u0 && v >= r.v0 && i < r.width && j < r.height && r.triangle[r.index(i, j)] >= 0);
-      }
-      if (!any) continue;
-      for (std::size_t k = 0; k < poses.size(); ++k)
-        out[k] -= prediction(scene, renders.of[k], cad_sigma_mm(*poses[k].first, detail), u, v, z).cost();
+  Image<std::uint8_t> any(all.width, all.height, 0);
+  for (const Prediction& p : all.of)
+    for (int j = 0; j < p.height; ++j) {
+      const std::size_t own = static_cast<std::size_t>(j) * static_cast<std::size_t>(p.width);
+      const std::size_t row = any.index(p.i0, p.j0 + j);
+      for (std::size_t i = 0; i < static_cast<std::size_t>(p.width); ++i) any.data[row + i] |= p.sigma_mm[own + i] > 0;
     }
+  std::size_t judged = 0;
+  for (const std::uint8_t a : any.data) judged += a;
+  parallel_each(static_cast<int>(poses.size()), [&](int which) {
+    // Where this pose says nothing but another does, all is unexplained.
+    const Prediction& p = all.of[static_cast<std::size_t>(which)];
+    double sum = kUnexplained * static_cast<double>(judged);
+    for (std::size_t k = 0; k < p.sigma_mm.size(); ++k) {
+      if (!(p.sigma_mm[k] > 0)) continue;
+      const float e = p.error_mm[k] / p.sigma_mm[k];
+      sum -= std::max(0.f, kUnexplained - 0.5f * e * e);
+    }
+    out[static_cast<std::size_t>(which)] = -sum;
+  });
   // Pixels closer than the noise's correlation tell the same story.
   const double inflation = std::max(1.0, correlation_inflation(scene.correlation_px) / (double(step_px) * step_px));
   for (double& l : out) l /= inflation;
@@ -111,15 +157,11 @@ std::vector<double> log_odds(const SceneDepth& scene, Detail detail,
   constexpr double kMostOfPatch = 8, kChance = 1.5;
   std::vector<double> out(poses.size(), 0.0);
   if (poses.size() < 2) return out;
-  const Renders renders(scene, detail, poses, step_px);
+  const Predictions all(scene, detail, poses, step_px);
   const double inflation = std::max(1.0, correlation_inflation(scene.correlation_px) / (double(step_px) * step_px));
-  const int width = (renders.u1 - renders.u0) / step_px + 1, height = (renders.v1 - renders.v0) / step_px + 1;
+  const int width = all.width, height = all.height;
   const int patches_x = (width + kPatch - 1) / kPatch, patches_y = (height + kPatch - 1) / kPatch;
-  const auto look = [&](std::size_t k, int i, int j, float z) {
-    return prediction(scene, renders.of[k], cad_sigma_mm(*poses[k].first, detail), renders.u0 + i * step_px,
-                      renders.v0 + j * step_px, z);
-  };
-  const auto depth = [&](int i, int j) { return scene.z_mm(renders.u0 + i * step_px, renders.v0 + j * step_px); };
+  const auto look = [&](std::size_t k, int i, int j) { return Look(all.of[k], i, j); };
 
   // How far whole patches are off their surface in the likeliest pose.
   constexpr int kFace = 8;
@@ -130,9 +172,7 @@ std::vector<double> log_odds(const SceneDepth& scene, Detail detail,
       int n = 0;
       for (int j = j0; j < std::min(height, j0 + kFace); ++j)
         for (int i = i0; i < std::min(width, i0 + kFace); ++i) {
-          const float z = depth(i, j);
-          if (!(z > 0)) continue;
-          const Prediction p = look(0, i, j, z);
+          const Look p = look(0, i, j);
           if (!p.any || std::abs(p.error_mm) > 5 * p.sigma_mm) continue;
           sum += p.error_mm;
           variance += p.sigma_mm * p.sigma_mm;
@@ -142,7 +182,7 @@ std::vector<double> log_odds(const SceneDepth& scene, Detail detail,
       means.push_back(sum / n);
       variances.push_back(variance / n / n * inflation);
     }
-  const double common_mm = common_error_mm(means, variances);
+  const auto common = static_cast<float>(4 * common_error_mm(means, variances));
 
   parallel_each(static_cast<int>(poses.size()) - 1, [&](int which) {
     const auto k = static_cast<std::size_t>(which) + 1;
@@ -151,20 +191,18 @@ std::vector<double> log_odds(const SceneDepth& scene, Detail detail,
     Image<float> gain(width, height, 0);  // of pose k over the first [nats]
     for (int j = 0; j < height; ++j)
       for (int i = 0; i < width; ++i) {
-        const float z = depth(i, j);
-        if (!(z > 0)) continue;
-        const auto cell = [&](int first, int k) {
-          return static_cast<std::size_t>((first + k * step_px) / scene.cell_px);
-        };
-        const std::size_t at =
-            cell(renders.v0, j) * static_cast<std::size_t>(scene.cell_normal.width) + cell(renders.u0, i);
-        if (elsewhere.holds(at)) continue;
-        const Prediction first = look(0, i, j, z), other = look(k, i, j, z);
+        const Look first = look(0, i, j), other = look(k, i, j);
         if (!first.any && !other.any) continue;
-        const double sigma = std::max(first.any ? first.sigma_mm : 0, other.any ? other.sigma_mm : 0);
-        const double apart = first.any && other.any ? std::abs(first.error_mm - other.error_mm) : 1e9;
-        tells(i, j) = apart > std::max(sigma, 4 * common_mm);
-        gain(i, j) = static_cast<float>(first.cost() - other.cost());
+        if (elsewhere.count > 0) {
+          const int cu = (all.u0 + i * step_px) / scene.cell_px, cv = (all.v0 + j * step_px) / scene.cell_px;
+          if (elsewhere.holds(static_cast<std::size_t>(cv) * static_cast<std::size_t>(scene.cell_normal.width) +
+                              static_cast<std::size_t>(cu)))
+            continue;
+        }
+        const float sigma = std::max(first.any ? first.sigma_mm : 0, other.any ? other.sigma_mm : 0);
+        const float apart = first.any && other.any ? std::abs(first.error_mm - other.error_mm) : 1e9f;
+        tells(i, j) = apart > std::max(sigma, common);
+        gain(i, j) = first.cost() - other.cost();
       }
     std::vector<double> votes(static_cast<std::size_t>(patches_x) * patches_y, 0.0);
     for (int j = 1; j + 1 < height; ++j)
