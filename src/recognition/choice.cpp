@@ -56,7 +56,7 @@ void add_spins(const SceneDepth& scene, const Part& part, const Pose& pose, std:
     if (step < few) {
       std::vector<Pose> looked;
       for (const int k : maxima) looked.push_back(spins[static_cast<std::size_t>(k)]);
-      const std::vector<double> finer = render_scores(scene, part, Detail::coarse, looked, step);
+      const std::vector<double> finer = render_scores(scene, part, Detail::full, looked, step);
       for (std::size_t i = 0; i < maxima.size(); ++i) score[static_cast<std::size_t>(maxima[i])] = finer[i];
       best_first();
     }
@@ -128,17 +128,22 @@ void add_half_turns(const SceneDepth& scene, const Part& part, const Pose& pose,
 /// Poses that the part's own shape confuses with this one.
 std::vector<Pose> rivals(const SceneDepth& scene, const Part& part, const Pose& pose) {
   std::vector<Pose> out;
-  const double tolerance = std::max(0.02 * part.diameter_mm, 4 * scene.median_sigma_mm);
-  const auto score = [&](const Pose& p) {
+  const auto score = [&](const Pose& p, double tolerance) {
     const PartView& view = view_of(part, p);
-    return look_up(scene, p, view.points, view.normals, 256, tolerance).score();
+    return look_up(scene, p, view.points, view.normals, 256, std::max(tolerance, 4 * scene.median_sigma_mm)).score();
   };
   // A rival that a few looks already put far behind is none.
-  const double own = score(pose);
+  constexpr double kBehind = 0.3;
+  const double near = 0.02 * part.diameter_mm, own = score(pose, near);
   for (const SelfSimilarPose& s : part.self_similar)
-    if (const Pose other = pose * s.part_from_part; score(other) > own - 0.3) out.push_back(other);
+    if (const Pose other = pose * s.part_from_part; score(other, near) > own - kBehind) out.push_back(other);
   add_spins(scene, part, pose, out);
-  add_half_turns(scene, part, pose, out);
+  // Half turns bring a face onto itself but nearly.
+  std::vector<Pose> halves;
+  add_half_turns(scene, part, pose, halves);
+  const double roughly = 0.05 * part.diameter_mm;
+  for (const Pose& other : halves)
+    if (score(other, roughly) > own - kBehind) out.push_back(other);
   return out;
 }
 
@@ -178,6 +183,8 @@ void add_weakest_moves(const Part& part, const PoseCandidate& from, std::vector<
   const Eigen::Matrix<double, 6, 6> h =
       scale.asDiagonal() * Eigen::Matrix<double, 6, 6>(from.information) * scale.asDiagonal();
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> eigen(h);
+  // A direction held a quarter as well as the best one has no such minima.
+  if (eigen.eigenvalues()(0) > eigen.eigenvalues()(5) / 16) return;
   const Vec3 center = place_of(part, from);
   // The enumeration's steps leave a pose up to half a step (4 % of the diameter at the rim) from the truth.
   for (const double share : {-0.04, -0.02, 0.02, 0.04}) {
@@ -210,12 +217,12 @@ CellMask mask_of(const Part& part, const SceneDepth& scene, const PoseCandidate&
 PoseCandidate settled_on_scan(const SceneDepth& scene, const Part& part, const PoseCandidate& candidate) {
   std::vector<Finalist> one = {{candidate.camera_from_part}};
   const int step = step_for(part, scene, candidate.camera_from_part, kPolishPixels);
-  compare(scene, part, Detail::coarse, step, 5, 0.012 * part.diameter_mm, one);
+  compare(scene, part, Detail::full, step, 5, 0.012 * part.diameter_mm, one);
   PoseCandidate out = candidate;
   out.camera_from_part = one[0].pose;
   out.information = one[0].information;
-  out.verification = verify_pose(part.coarse_mesh, scene, one[0].pose,
-                                 verification_options(part, Detail::coarse, step, 0.002 * part.diameter_mm));
+  out.verification = verify_pose(part.render_mesh, scene, one[0].pose,
+                                 verification_options(part, Detail::full, step, 0.002 * part.diameter_mm));
   return out;
 }
 
@@ -312,7 +319,7 @@ Polished polish_once(const SceneDepth& scene, std::span<const Part> parts, const
 
   // Fine: the survivors on more pixels, compared by likelihood; those that stay near the best once more on all pixels.
   const int fine = step_for(part, scene, settled.camera_from_part, kPolishPixels);
-  if (finalists.size() > 1) compare(scene, part, Detail::coarse, fine, 5, 0.012 * part.diameter_mm, finalists);
+  if (finalists.size() > 1) compare(scene, part, Detail::full, fine, 5, 0.012 * part.diameter_mm, finalists);
   std::erase_if(finalists, [best = finalists[0].log_likelihood](const Finalist& f) {
     return f.log_likelihood < best - kUndecided;
   });

@@ -92,7 +92,7 @@ void settle(const SceneDepth& scene, std::span<const Part> parts, const Field& f
   std::vector<std::pair<const Part*, Pose>> poses;
   for (const Polished& p : place.polished)
     poses.emplace_back(&parts[static_cast<std::size_t>(p.candidate.part)], p.candidate.camera_from_part);
-  place.ranking = rank_poses(scene, Detail::coarse, poses, step_for(*poses[0].first, scene, poses[0].second, 6000));
+  place.ranking = rank_poses(scene, Detail::full, poses, step_for(*poses[0].first, scene, poses[0].second, 6000));
 }
 
 }  // namespace
@@ -141,23 +141,33 @@ std::vector<Polished> choose_winners(const SceneFeatures& features, const SceneD
     return true;
   };
   while (true) {
-    // Places that share no cell cannot take anything from each other. So many at a time keep the cores busy; how many
-    // there are must not depend on the cores.
+    // Places that share no cell with any better one cannot take anything from each other. So many at a time keep the
+    // cores busy; how many there are must not depend on the cores.
     constexpr std::size_t kAtATime = 4;
+    constexpr int kMostWaiting = 16;  // behind so many there is hardly a place that is free
+    int waiting = 0;
     std::vector<Place> places;
-    CellMask wanted;  // by those of this wave
-    for (std::size_t i = 0; i < field.candidates.size() && places.size() < kAtATime; ++i) {
+    CellMask wanted;  // by what is better: of this wave, or waiting for it
+    for (std::size_t i = 0; i < field.candidates.size() && places.size() < kAtATime && waiting < kMostWaiting; ++i) {
       if (field.done[i]) continue;
       if (taken(field.candidates[i], field.masks[i])) {
         field.done[i] = true;
         continue;
       }
-      if (wanted.shared(field.masks[i]) > 0) continue;
+      if (wanted.shared(field.masks[i]) > 0) {
+        wanted.join(field.masks[i]);
+        ++waiting;
+        continue;
+      }
       Place place = place_of_candidate(field, i, parts.size());
-      if (!places.empty() && wanted.shared(place.cells) > 0) continue;
+      const bool waits = wanted.shared(place.cells) > 0;
+      wanted.join(place.cells);
+      if (waits) {
+        ++waiting;
+        continue;
+      }
       if (!budget.take()) break;
       for (const std::size_t k : place.rivals) field.done[k] = true;
-      wanted.join(place.cells);
       places.push_back(std::move(place));
     }
     if (places.empty()) break;
