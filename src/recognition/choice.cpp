@@ -214,6 +214,14 @@ CellMask mask_of(const Part& part, const SceneDepth& scene, const PoseCandidate&
   return mask;
 }
 
+PoseCandidate looked_at_closely(const SceneDepth& scene, const Part& part, const PoseCandidate& candidate) {
+  const int step = step_for(part, scene, candidate.camera_from_part, kPolishPixels);
+  PoseCandidate out = candidate;
+  out.verification = verify_pose(part.coarse_mesh, scene, candidate.camera_from_part,
+                                 verification_options(part, Detail::coarse, step, 0.004 * part.diameter_mm));
+  return out;
+}
+
 PoseCandidate settled_on_scan(const SceneDepth& scene, const Part& part, const PoseCandidate& candidate) {
   std::vector<Finalist> one = {{candidate.camera_from_part}};
   const int step = step_for(part, scene, candidate.camera_from_part, kPolishPixels);
@@ -386,8 +394,8 @@ void decide_again(const SceneDepth& scene, std::span<const Part> parts, const Ce
 }
 
 bool hopeful(const Part& part, const PoseCandidate& candidate, std::vector<Reason>& rejected) {
-  // A thousand pixels and a pose a little off tell less: twice what `plausible` leaves open, and the outline's few
-  // samples two standard deviations besides. Spares a third of the fits on a dense heap and changes no answer there.
+  // Few pixels and a pose a little off tell less: twice what `plausible` leaves open, and the outline's few samples two
+  // standard deviations besides.
   constexpr double kSlack = 0.3;
   const Verification& v = candidate.verification;
   const auto fails = [&](const char* test, double value, double limit, bool bad) {

@@ -19,8 +19,11 @@ struct Polished {
 /// The cells whose pixels a rendered pose supports.
 CellMask mask_of(const Part& part, const SceneDepth& scene, const PoseCandidate& candidate);
 
-/// Worth a fit on more pixels? By its verification on a thousand.
+/// Worth a fit on more pixels? By its verification on few of them: twice what `plausible` leaves open.
 bool hopeful(const Part& part, const PoseCandidate& candidate, std::vector<Reason>& rejected);
+
+/// A candidate as it stands, verified on some thousand pixels: an outline has few samples on a thousand.
+PoseCandidate looked_at_closely(const SceneDepth& scene, const Part& part, const PoseCandidate& candidate);
 
 /// A candidate refined and verified on some thousand pixels, as it stands: no other pose is tried.
 PoseCandidate settled_on_scan(const SceneDepth& scene, const Part& part, const PoseCandidate& candidate);

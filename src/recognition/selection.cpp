@@ -73,11 +73,20 @@ void settle(const SceneDepth& scene, std::span<const Part> parts, const Field& f
     (hopeful(parts[static_cast<std::size_t>(c.part)], c, place.rejected) ? hopefuls : place.refused).push_back(k);
   }
   std::vector<PoseCandidate> settled(hopefuls.size());
-  parallel_each(static_cast<int>(hopefuls.size()), [&](int r) {
-    const PoseCandidate& c = field.candidates[hopefuls[static_cast<std::size_t>(r)]];
-    settled[static_cast<std::size_t>(r)] = settled_on_scan(scene, parts[static_cast<std::size_t>(c.part)], c);
+  std::vector<std::vector<Reason>> hopeless(hopefuls.size());
+  parallel_each(static_cast<int>(hopefuls.size()), [&](int i) {
+    const auto r = static_cast<std::size_t>(i);
+    const PoseCandidate& c = field.candidates[hopefuls[r]];
+    const Part& part = parts[static_cast<std::size_t>(c.part)];
+    settled[r] = looked_at_closely(scene, part, c);
+    if (hopeful(part, settled[r], hopeless[r])) settled[r] = settled_on_scan(scene, part, c);
   });
   for (std::size_t r = 0; r < settled.size(); ++r) {
+    for (const Reason& reason : hopeless[r]) add_reason(place.rejected, reason);
+    if (!hopeless[r].empty()) {
+      place.refused.push_back(hopefuls[r]);
+      continue;
+    }
     const PoseCandidate& c = settled[r];
     const auto of = static_cast<std::size_t>(c.part);
     const bool twin = std::any_of(place.polished.begin(), place.polished.end(),
