@@ -331,7 +331,11 @@ Polished polish_once(const SceneDepth& scene, std::span<const Part> parts, const
   std::erase_if(finalists, [best = finalists[0].log_likelihood](const Finalist& f) {
     return f.log_likelihood < best - kUndecided;
   });
-  if (finalists.size() > 1)
+  // Where so many poses remain even, what would tell them apart is not in view: more pixels would not show it.
+  constexpr std::ptrdiff_t kEven = 8;
+  const auto even =
+      std::count_if(finalists.begin(), finalists.end(), [](const Finalist& f) { return f.log_likelihood > -1; });
+  if (finalists.size() > 1 && even < kEven)
     compare(scene, part, Detail::full, step_for(part, scene, settled.camera_from_part, kDecidePixels), 2, 0, finalists);
 
   Polished out;
