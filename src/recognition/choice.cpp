@@ -361,16 +361,21 @@ Polished polish(const SceneDepth& scene, std::span<const Part> parts, const Pose
                 std::span<const Pose> also) {
   const Part& part = parts[static_cast<std::size_t>(settled.part)];
   Polished out = polish_once(scene, parts, settled, also);
-  // Upside down and turned: a pose that has changed is taken for others than the one it came from.
+  // Upside down and turned: a pose that has changed is taken for others than the one it came from, but spins among
+  // themselves are taken for the same.
   constexpr int kMore = 2;
   PoseCandidate from = settled;
   for (int i = 0; i < kMore; ++i) {
-    const auto same = [&](const Pose& pose) {
+    const Pose& now = out.candidate.camera_from_part;
+    const auto is = [&](const Pose& pose) {
       return close_poses(part, from.camera_from_part, pose, 0.02 * part.diameter_mm, 4 * kDegree);
     };
-    if (same(out.candidate.camera_from_part) ||
-        std::any_of(out.others.begin(), out.others.end(), [&](const auto& other) { return same(other.first); }))
-      break;
+    const bool compared = std::any_of(out.others.begin(), out.others.end(), [&](const auto& o) { return is(o.first); });
+    const bool spun = std::any_of(part.nearly_round.begin(), part.nearly_round.end(), [&](const auto& line) {
+      const Eigen::Vector3d axis = Eigen::Vector3d(line.axis).normalized();
+      return (now.linear() * axis).dot(from.camera_from_part.linear() * axis) > std::cos(4 * kDegree);
+    });
+    if (is(now) || (compared && spun)) break;
     from = out.candidate;
     out = polish_once(scene, parts, from, also);
   }
