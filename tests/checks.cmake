@@ -23,9 +23,14 @@ tribin_check(consumer tests/consumer/run ${PROJECT_SOURCE_DIR} ${PROJECT_BINARY_
 # The loops that are built for several levels of vectors, built for one each: objects of a program go before those of
 # the library. The levels must give the same bytes.
 if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64" AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
-  set(vectorised src/capture/fringe_lanes.cpp src/capture/ideal_view.cpp src/pose/raster.cpp
-                 src/segmentation/normal_equations.cpp src/surfel/quadrics.cpp)
-  list(TRANSFORM vectorised PREPEND ${PROJECT_SOURCE_DIR}/)
+  set(vectorised)
+  foreach(source ${TRIBIN_SOURCES})
+    cmake_path(ABSOLUTE_PATH source BASE_DIRECTORY ${PROJECT_SOURCE_DIR})
+    file(STRINGS ${source} found REGEX "^TRIBIN_VECTOR_LEVELS" LIMIT_COUNT 1)
+    if(found)
+      list(APPEND vectorised ${source})
+    endif()
+  endforeach()
   set(levels)
   foreach(level sse2 avx2 avx512f)
     add_executable(at_${level} simd/at_level.cpp ${vectorised})
