@@ -1,151 +1,19 @@
 #include "choice.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 
 #include "likelihood.hpp"
-#include "render_scores.hpp"
+#include "rivals.hpp"
 #include "tribin/core/parallel.hpp"
 #include "tribin/pose/index_render.hpp"
-#include "tribin/pose/look_up.hpp"
 
 namespace tribin {
 namespace {
 
-// Pixels that a polished pose is fitted and compared on: enough for 0.1 sigma of any mean, a few ms a pose.
-constexpr double kPolishPixels = 4000;
-constexpr double kCompareFew = 1000;
-// Poses that a comparison leaves within so many nats are compared again on all pixels.
+// Pixels that poses which stay near each other are decided on.
 constexpr double kDecidePixels = 40000;
-constexpr double kUndecided = 30;
-
-/// The pose turned about a line of the part.
-Pose turned(const Pose& pose, const ContinuousSymmetry& line, double angle) {
-  Pose turn = Pose::Identity();
-  turn.linear() = Eigen::AngleAxisd(angle, Eigen::Vector3d(line.axis).normalized()).toRotationMatrix();
-  turn.translation() = Eigen::Vector3d(line.point) - turn.linear() * Eigen::Vector3d(line.point);
-  return pose * turn;
-}
-
-/// Spins about the axes that the part is nearly round about: the best rendered poses over the whole turn. A search on
-/// the likelihood, because ICP slides past the small features that decide. (The view's points instead of renders rank
-/// the right spin behind the eighth in 15 % of the cases, renders in 2 %.)
-void add_spins(const SceneDepth& scene, const Part& part, const Pose& pose, std::vector<Pose>& out) {
-  constexpr int kSpins = 120;  // 3 deg: a hole of 5 % of the diameter at its rim
-  constexpr std::size_t kBest = 8, kMost = 24;
-  constexpr std::size_t kLooked = 24;  // maxima on few pixels that are looked at again on more
-  const int few = step_for(part, scene, pose, kCompareFew), step = step_for(part, scene, pose, kPolishPixels);
-  for (const ContinuousSymmetry& axis : part.nearly_round) {
-    std::vector<Pose> spins;
-    for (int k = 0; k < kSpins; ++k) spins.push_back(turned(pose, axis, 2 * kPi * k / kSpins));
-    std::vector<double> score = render_scores(scene, part, Detail::coarse, spins, few);
-    std::vector<int> maxima;
-    for (int k = 1; k < kSpins; ++k) {
-      const auto at = [&](int i) { return score[static_cast<std::size_t>((i + kSpins) % kSpins)]; };
-      if (at(k) >= at(k - 1) && at(k) > at(k + 1)) maxima.push_back(k);
-    }
-    const auto best_first = [&] {
-      std::stable_sort(maxima.begin(), maxima.end(), [&](int a, int b) {
-        return score[static_cast<std::size_t>(a)] > score[static_cast<std::size_t>(b)];
-      });
-    };
-    best_first();
-    if (maxima.size() > kLooked) maxima.resize(kLooked);
-    if (step < few) {
-      std::vector<Pose> looked;
-      for (const int k : maxima) looked.push_back(spins[static_cast<std::size_t>(k)]);
-      const std::vector<double> finer = render_scores(scene, part, Detail::full, looked, step);
-      for (std::size_t i = 0; i < maxima.size(); ++i) score[static_cast<std::size_t>(maxima[i])] = finer[i];
-      best_first();
-    }
-    // Where the scan hardly tells the spins apart, all of them are alternatives.
-    std::size_t keep = std::min(kBest, maxima.size());
-    while (keep < std::min(kMost, maxima.size()) &&
-           score[static_cast<std::size_t>(maxima[keep])] > score[static_cast<std::size_t>(maxima[0])] - kUndecided)
-      ++keep;
-    // Refinement hardly turns what is nearly round: the spins are brought to their best by halves of the step.
-    std::vector<double> angle(keep), best(keep);
-    for (std::size_t i = 0; i < keep; ++i) {
-      angle[i] = 2 * kPi * maxima[i] / kSpins;
-      best[i] = score[static_cast<std::size_t>(maxima[i])];
-    }
-    constexpr int kHalvings = 3;  // to 0.4 deg
-    for (int h = 0; h < kHalvings; ++h) {
-      const double turn = kPi / kSpins / (1 << h);
-      std::vector<double> tried;
-      std::vector<Pose> beside;
-      for (std::size_t i = 0; i < 2 * keep; ++i) {
-        tried.push_back(angle[i / 2] + (i % 2 ? turn : -turn));
-        beside.push_back(turned(pose, axis, tried.back()));
-      }
-      const std::vector<double> there = render_scores(scene, part, Detail::coarse, beside, std::min(step, few));
-      for (std::size_t i = 0; i < 2 * keep; ++i)
-        if (there[i] > best[i / 2]) {
-          best[i / 2] = there[i];
-          angle[i / 2] = tried[i];
-        }
-    }
-    for (std::size_t i = 0; i < keep; ++i) out.push_back(turned(pose, axis, angle[i]));
-  }
-}
-
-/// Half turns about the faces that most of what is seen belongs to: about the middle of a plane, end for end of a
-/// cylinder. They bring a face onto itself, or nearly, and what would tell may be hidden.
-void add_half_turns(const SceneDepth& scene, const Part& part, const Pose& pose, std::vector<Pose>& out) {
-  IndexRender render;
-  const int step = step_for(part, scene, pose, kCompareFew);
-  render_index(part.render_mesh, scene.camera, pose, step, render);
-  std::vector<int> pixels(part.model.primitives.size() + 1, 0);
-  int all = 0;
-  for (int j = 0; j < render.height; ++j)
-    for (int i = 0; i < render.width; ++i) {
-      const std::size_t k = render.index(i, j);
-      if (render.triangle[k] < 0) continue;
-      const int u = render.u0 + i * step, v = render.v0 + j * step;
-      const float z = scene.z_mm(u, v);
-      if (!(std::abs(z - 1 / render.inverse_z[k]) < 0.02 * part.diameter_mm + 5 * scene.sigma_mm(u, v))) continue;
-      ++pixels[static_cast<std::size_t>(part.primitive_of_triangle[static_cast<std::size_t>(render.triangle[k])])];
-      ++all;
-    }
-  for (const Primitive& p : part.model.primitives) {
-    if (4 * pixels[static_cast<std::size_t>(p.id)] < all) continue;
-    ContinuousSymmetry line;
-    line.axis = p.axis;
-    line.point = p.point;
-    if (p.type == PrimitiveType::cylinder) {
-      line.point = p.point + p.axis * (0.5 * (p.extent_min + p.extent_max));
-      const Eigen::Vector3d eye = pose.inverse() * Eigen::Vector3d(0, 0, 0) - Eigen::Vector3d(line.point);
-      line.axis = Vec3(eye - Eigen::Vector3d(p.axis) * eye.dot(Eigen::Vector3d(p.axis)));
-    } else if (p.type != PrimitiveType::plane) {
-      continue;
-    }
-    out.push_back(turned(pose, line, kPi));
-  }
-}
-
-/// Poses that the part's own shape confuses with this one.
-std::vector<Pose> rivals(const SceneDepth& scene, const Part& part, const Pose& pose) {
-  std::vector<Pose> out;
-  const auto score = [&](const Pose& p, double tolerance) {
-    const PartView& view = view_of(part, p);
-    return look_up(scene, p, view.points, view.normals, 256, std::max(tolerance, 4 * scene.median_sigma_mm)).score();
-  };
-  // A rival that a few looks already put far behind is none.
-  constexpr double kBehind = 0.3;
-  const double near = 0.02 * part.diameter_mm, own = score(pose, near);
-  for (const SelfSimilarPose& s : part.self_similar)
-    if (const Pose other = pose * s.part_from_part; score(other, near) > own - kBehind) out.push_back(other);
-  add_spins(scene, part, pose, out);
-  // Half turns bring a face onto itself but nearly.
-  std::vector<Pose> halves;
-  add_half_turns(scene, part, pose, halves);
-  const double roughly = 0.05 * part.diameter_mm;
-  for (const Pose& other : halves)
-    if (score(other, roughly) > own - kBehind) out.push_back(other);
-  return out;
-}
 
 struct Finalist {
   Pose pose = Pose::Identity();
@@ -173,24 +41,6 @@ void compare(const SceneDepth& scene, const Part& part, Detail detail, int step,
     ranked.back().log_likelihood = ranking.log_odds[i];
   }
   finalists = std::move(ranked);
-}
-
-/// The pose moved to both sides along the direction that its information holds least: slots and steps make local minima
-/// there that refinement does not leave.
-void add_weakest_moves(const Part& part, const PoseCandidate& from, std::vector<Pose>& out) {
-  using Vec6 = Eigen::Matrix<double, 6, 1>;
-  const Vec6 scale = scale_of_motion(part.gyration_mm);
-  const Eigen::Matrix<double, 6, 6> h =
-      scale.asDiagonal() * Eigen::Matrix<double, 6, 6>(from.information) * scale.asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> eigen(h);
-  // A direction held a quarter as well as the best one has no such minima.
-  if (eigen.eigenvalues()(0) > eigen.eigenvalues()(5) / 16) return;
-  const Vec3 center = place_of(part, from);
-  // The enumeration's steps leave a pose up to half a step (4 % of the diameter at the rim) from the truth.
-  for (const double share : {-0.04, -0.02, 0.02, 0.04}) {
-    const Vec6 delta = scale.cwiseProduct(eigen.eigenvectors().col(0)) * (share * part.diameter_mm);
-    out.push_back(moved_about(from.camera_from_part, center, Vector6(delta)));
-  }
 }
 
 }  // namespace

@@ -1,0 +1,23 @@
+#pragma once
+
+#include <vector>
+
+#include "candidates.hpp"
+
+namespace tribin {
+
+// Pixels that a polished pose is fitted and compared on: enough for 0.1 sigma of any mean, a few ms a pose.
+inline constexpr double kPolishPixels = 4000;
+inline constexpr double kCompareFew = 1000;  // and those that all its rivals are sifted on
+// Poses that a comparison leaves within so many nats are compared again on all pixels.
+inline constexpr double kUndecided = 30;
+
+/// Poses that the part's own shape confuses with this one: self-similar ones, spins about axes that it is nearly round
+/// about, half turns about the faces that are seen.
+std::vector<Pose> rivals(const SceneDepth& scene, const Part& part, const Pose& pose);
+
+/// The pose moved to both sides along the direction that its information holds least: slots and steps make local minima
+/// there that refinement does not leave.
+void add_weakest_moves(const Part& part, const PoseCandidate& from, std::vector<Pose>& out);
+
+}  // namespace tribin
