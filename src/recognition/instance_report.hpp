@@ -16,6 +16,9 @@ std::vector<Vector6> free_directions_about_center(const Part& part, const Pose& 
 void describe_uncertainty(const Part& part, const Matrix6& systematic_pull, const Matrix6& patch_pull,
                           const Refinement& refinement, Instance& instance);
 
+/// Mean square of how far the covariance lets a point of the part (camera frame) move, over all directions [mm^2].
+double motion_variance(const Instance& instance, const Vec3& at);
+
 /// Fills evidence and quality of all that was found: each primitive that enough pixels show measured free of its
 /// nominal value, the dimensions between them, the surface point by point.
 void describe_quality(std::span<const Part> parts, const SceneDepth& scene, const SceneFeatures& features,

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "instance_report.hpp"
+
 namespace tribin {
 namespace {
 
@@ -72,16 +74,6 @@ Flags mirrored_pixels(const Part& part, const SceneDepth& scene, const IndexRend
 }
 
 }  // namespace
-
-double motion_variance(const Instance& instance, const Vec3& at) {
-  // A point moves by dt + w x (point - origin).
-  const Eigen::Vector3d arm = at - Vec3(instance.camera_from_part.translation());
-  Eigen::Matrix<double, 3, 6> j;
-  j << 1, 0, 0, 0, arm.z(), -arm.y(),  //
-      0, 1, 0, -arm.z(), 0, arm.x(),   //
-      0, 0, 1, arm.y(), -arm.x(), 0;
-  return (j * Eigen::Matrix<double, 6, 6>(instance.covariance) * j.transpose()).trace();
-}
 
 PartPixels compare_pixels(const Part& part, const SceneDepth& scene, const Instance& instance) {
   constexpr double kPixels = 20000;  // more of them do not make systematic terms smaller

@@ -26,9 +26,6 @@ struct PartPixels {
   }
 };
 
-/// Mean square of how far the covariance lets a point of the part (camera frame) move, over all directions [mm^2].
-double motion_variance(const Instance& instance, const Vec3& at);
-
 /// Edges are left out as far as the pose may be off beside them, by the instance's covariance.
 /// \cost one render of 20 000 pixels, and some 50 ns a pixel.
 PartPixels compare_pixels(const Part& part, const SceneDepth& scene, const Instance& instance);

@@ -44,11 +44,8 @@ double probability_below(double limit, double rms) {
 /// [rad].
 std::pair<double, double> predicted_errors(const Part& part, const Instance& instance) {
   const Eigen::Matrix<double, 6, 6> c = instance.covariance;
-  const Eigen::Vector3d arm = instance.camera_from_part.linear() * Eigen::Vector3d(part.box_center());
-  Eigen::Matrix<double, 3, 6> j = Eigen::Matrix<double, 3, 6>::Zero();
-  j.leftCols<3>().setIdentity();
-  j.rightCols<3>() << 0, arm.z(), -arm.y(), -arm.z(), 0, arm.x(), arm.y(), -arm.x(), 0;
-  return {std::sqrt((j * c * j.transpose()).trace()), std::sqrt(c.bottomRightCorner<3, 3>().trace())};
+  return {std::sqrt(motion_variance(instance, instance.camera_from_part * part.box_center())),
+          std::sqrt(c.bottomRightCorner<3, 3>().trace())};
 }
 
 /// What the alternatives leave to the pose that is told.

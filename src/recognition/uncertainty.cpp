@@ -92,4 +92,14 @@ void describe_uncertainty(const Part& part, const Matrix6& systematic_pull, cons
   instance.covariance = 0.5 * (covariance + covariance.transpose());
 }
 
+double motion_variance(const Instance& instance, const Vec3& at) {
+  // A point moves by dt + w x (point - origin).
+  const Eigen::Vector3d arm = at - Vec3(instance.camera_from_part.translation());
+  Eigen::Matrix<double, 3, 6> j;
+  j << 1, 0, 0, 0, arm.z(), -arm.y(),  //
+      0, 1, 0, -arm.z(), 0, arm.x(),   //
+      0, 0, 1, arm.y(), -arm.x(), 0;
+  return (j * Eigen::Matrix<double, 6, 6>(instance.covariance) * j.transpose()).trace();
+}
+
 }  // namespace tribin
