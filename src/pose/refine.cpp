@@ -112,7 +112,7 @@ Refinement refine_pose(const RenderMesh& mesh, const SceneDepth& scene, const Po
       move_render(mesh, scene.camera, out.camera_from_part, render);
     }
     const SurfaceSums sums = surface_sums(scene, render, center, final_pass ? end_scale : std::max(scale, end_scale),
-                                          options.cad_sigma_mm, kernel, final_pass);
+                                          options.cad_sigma_mm, kernel, options.by_patches, final_pass);
     // Pixels nearer than the noise's correlation count once.
     const double independent =
         1 / std::max(1.0, correlation_inflation(scene.correlation_px) / (double(render.step) * render.step));

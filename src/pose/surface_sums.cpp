@@ -14,6 +14,7 @@ namespace {
 constexpr int kBandRows = 16;
 
 constexpr std::size_t kLanes = 16;
+constexpr float kFarOff = 1e15f;  // a residual that weighs nothing
 
 /// What `accumulate` reads of the pixels of a band: numbers of a point, one array each.
 struct Points {
@@ -76,9 +77,42 @@ TRIBIN_VECTOR_LEVELS void weigh_points(const float* r, const float* variance, co
   }
 }
 
+/// Patches of a band: squares of the render and directions of the normal. Where most of a patch misfits, the few points
+/// that fit do so by chance: where the surface crosses the scan, and where edges mix.
+class Patches {
+ public:
+  void clear(int width) { counts_.assign(static_cast<std::size_t>((width + kSide - 1) / kSide) * kDirections, {}); }
+  /// \return the patch of a point in column i
+  std::uint32_t count(int i, const Vec3f& normal, bool fits) {
+    const auto level = [](float x) { return static_cast<int>(2 * x + 2.5f); };  // 0 to 4
+    const int direction = (level(normal[0]) * 5 + level(normal[1])) * 5 + level(normal[2]);
+    const auto patch = static_cast<std::uint32_t>((i / kSide) * kDirections + direction);
+    ++counts_[patch].all;
+    counts_[patch].fit += fits;
+    return patch;
+  }
+  bool fits(std::uint32_t patch) const {
+    constexpr int kLeast = 12;  // three points by four: fewer are an edge of a surface, and what is mixed there
+    return counts_[patch].fit >= kLeast && 2 * counts_[patch].fit >= counts_[patch].all;
+  }
+
+ private:
+  static constexpr int kSide = kBandRows, kDirections = 125;
+  struct Count {
+    int all = 0, fit = 0;
+  };
+  std::vector<Count> counts_;
+};
+
 /// The points of some rows of a render.
+/// \param patches  if given, points of those that mostly misfit are left out.
+/// \param scale2_mm, kernel2  what fits, as in weigh_points.
 void gather_points(const SceneDepth& scene, const IndexRender& render, const Eigen::Vector3d& center,
-                   double cad_sigma_mm, int begin, int end, Points& out) {
+                   double cad_sigma_mm, int begin, int end, Patches* patches, float scale2_mm, float kernel2,
+                   Points& out) {
+  thread_local std::vector<std::uint32_t> patch_of;
+  patch_of.clear();
+  if (patches != nullptr) patches->clear(render.width);
   const PinholeCamera& camera = scene.camera;
   const auto cx = static_cast<float>(center.x()), cy = static_cast<float>(center.y()),
              cz = static_cast<float>(center.z());
@@ -97,28 +131,36 @@ void gather_points(const SceneDepth& scene, const IndexRender& render, const Eig
       const float along = n[0] * rx + n[1] * ry + n[2];  // n . ray, negative
       const float sigma = scene.sigma_mm(u, v) * along;
       const float px = rx * z - cx, py = ry * z - cy, pz = z - cz;
-      out.add((z - 1 / render.inverse_z[render.index(i, j)]) * along, sigma * sigma + cad_variance,
-              {n[0], n[1], n[2], py * n[2] - pz * n[1], pz * n[0] - px * n[2], px * n[1] - py * n[0]});
+      const float r = (z - 1 / render.inverse_z[render.index(i, j)]) * along, variance = sigma * sigma + cad_variance;
+      out.add(r, variance, {n[0], n[1], n[2], py * n[2] - pz * n[1], pz * n[0] - px * n[2], px * n[1] - py * n[0]});
+      if (patches != nullptr) patch_of.push_back(patches->count(i, n, r * r < std::max(scale2_mm, kernel2 * variance)));
     }
   }
+  if (patches == nullptr) return;
+  float* residual = out.field(Points::kResidual);
+  for (std::size_t k = 0; k < patch_of.size(); ++k)
+    if (!patches->fits(patch_of[k])) residual[k] = kFarOff;
 }
 
 }  // namespace
 
 SurfaceSums surface_sums(const SceneDepth& scene, const IndexRender& render, const Eigen::Vector3d& center,
-                         double scale_mm, double cad_sigma_mm, double kernel_sigmas, bool final_pass) {
+                         double scale_mm, double cad_sigma_mm, double kernel_sigmas, bool by_patches, bool final_pass) {
   std::vector<SurfaceSums> bands(static_cast<std::size_t>((render.height + kBandRows - 1) / kBandRows));
   const auto band = [&](int begin, int end) {
     thread_local Points points;
     points.clear(static_cast<std::size_t>(render.width) * static_cast<std::size_t>(end - begin));
-    gather_points(scene, render, center, cad_sigma_mm, begin, end, points);
+    thread_local Patches patches;
+    const auto scale2_mm = static_cast<float>(scale_mm * scale_mm),
+               kernel2 = static_cast<float>(kernel_sigmas * kernel_sigmas);
+    gather_points(scene, render, center, cad_sigma_mm, begin, end, by_patches ? &patches : nullptr, scale2_mm, kernel2,
+                  points);
     const std::size_t count = points.count;
-    while (points.count % kLanes) points.add(1e15f, 1, {});  // so far off that it weighs nothing
+    while (points.count % kLanes) points.add(kFarOff, 1, {});
     std::array<float, kSums * kLanes> lanes{};
     float* e2 = points.field(Points::kE2);
     weigh_points(points.field(Points::kResidual), points.field(Points::kVariance), points.field(Points::kJacobian),
-                 points.stride, points.count, static_cast<float>(scale_mm * scale_mm),
-                 static_cast<float>(kernel_sigmas * kernel_sigmas), final_pass, e2, lanes.data());
+                 points.stride, points.count, scale2_mm, kernel2, final_pass, e2, lanes.data());
     const auto sum_of = [&](std::size_t s) {
       double sum = 0;
       for (std::size_t l = 0; l < kLanes; ++l) sum += static_cast<double>(lanes[s * kLanes + l]);

@@ -40,9 +40,10 @@ struct SurfaceSums {
 /// \param center        in the camera frame [mm]; rotations turn about it.
 /// \param scale_mm      of the kernel (Geman and McClure), at least `kernel_sigmas` times a point's sigma.
 /// \param cad_sigma_mm  of the mesh about the part's surface, beside the scan's local sigma.
+/// \param by_patches    points count only where at least half of the patch around them lies within the kernel.
 /// \param final_pass    points that the kernel leaves a quarter of their weight count whole, others not at all.
 /// \cost about 10 ns a pixel.
 SurfaceSums surface_sums(const SceneDepth& scene, const IndexRender& render, const Eigen::Vector3d& center,
-                         double scale_mm, double cad_sigma_mm, double kernel_sigmas, bool final_pass);
+                         double scale_mm, double cad_sigma_mm, double kernel_sigmas, bool by_patches, bool final_pass);
 
 }  // namespace tribin

@@ -66,7 +66,7 @@ Instance make_instance(const Polished& p, std::span<const Part> parts, const Sce
       std::max(scene.correlation_px >= 0.7 ? 2 : 1, step_for(part, scene, p.candidate.camera_from_part, 60000));
   RefineOptions options =
       refine_options(part, Detail::full, step, 3, std::max(0.002 * part.diameter_mm, 4 * scene.median_sigma_mm));
-  options.outlines = true;
+  options.outlines = options.by_patches = true;
   options.frozen = free_directions_about_center(part, p.candidate.camera_from_part);
   Refinement refined = refine_guarded(part, Detail::full, scene, p.candidate.camera_from_part, options);
   settle_weak_directions(part, scene, options.frozen,

@@ -17,6 +17,7 @@ struct RefineOptions {
   Vec3 center = Vec3::Zero();   ///< part frame; rotations turn about it (the box centre)
   double lever_mm = 1;          ///< length that turns radians into mm when directions are compared (radius of gyration)
   double kernel_sigmas = 3;     ///< the kernel ends at so many local sigma; > 0
+  bool by_patches = false;      ///< pixels count only where half of the patch around them fits: few fit by chance
   bool outlines = false;        ///< the part's outline pulls towards depth edges, in true units
   double cad_sigma_mm = 0;      ///< how far the part may be from its CAD (chord error, casting)
 };
