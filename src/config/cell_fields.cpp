@@ -214,6 +214,11 @@ Fields<CellRobot> robot_fields() {
   Fields<CellRobot> fields;
   fields.file("model", &CellRobot::model, "geometry file of the arm").required();
   fields.text("arm", &CellRobot::arm, "of a model of several; left out: its first");
+  fields.texts("grippers", &CellRobot::grippers, "that sit on this arm; left out: all");
+  fields.value("wait", "", "pose", "none", &CellRobot::wait,
+               "base_from_flange where one of two arms waits, out of the camera's sight and of the other's way; it "
+               "turns with the waist",
+               read_pose);
   fields.table("controller", controller_fields(), &CellRobot::controller, "how it is reached");
   fields.number("sigma_mm", "mm", {0, 100}, &CellRobot::sigma_mm, "sd of where it stands when it is sent somewhere");
   fields.value("way_points", "", "at most 6 poses", "[]", &CellRobot::way_points,

@@ -55,6 +55,9 @@ void check_names(const TomlPlace& top, const Sections& s) {
       if (!s.parts[i].pick_points[k].gripper.empty())
         must_know(part.at("pick_points").at(k).at("gripper"), s.parts[i].pick_points[k].gripper, s.grippers);
   }
+  for (std::size_t i = 0; i < s.robots.size(); ++i)
+    for (std::size_t k = 0; k < s.robots[i].grippers.size(); ++k)
+      must_know(top.at("robot").at(i).at("grippers").at(k), s.robots[i].grippers[k], s.grippers);
 }
 
 /// What is odd but no error: a sequence may name a part that the cell does not have yet.

@@ -1,10 +1,12 @@
+#include <regex>
+
 #include "tribin/controller_sim/inform.hpp"
 
 namespace tribin::controller_sim {
+namespace {
 
-// A test holds it against examples/robots/BPICK.JBI.
-std::string handshake_job() {
-  return R"(/JOB
+// A test holds the jobs against those of examples/robots.
+constexpr const char* kJob = R"(/JOB
 //NAME BPICK
 //POS
 ///NPOS 2,0,0,0,0,0
@@ -105,6 +107,68 @@ SET B000 0
 JUMP *WAIT
 END
 )";
+
+// Where a zone is another arm's, or nobody's, the job does not go into it: the token is the controller's word.
+constexpr const char* kTaken = "SET I001 I000\nSET B001 1\n";
+constexpr const char* kWaist = R"(*WAIST
+JUMP *STALE IF I000=I002
+SET I001 I000
+SET B001 1
+'BOTH ARMS WAIT; TWAIST TURNS THE
+'WAIST TO I004 AND ANSWERS IN I005
+SET B003 3
+JUMP *DONE IF B020>0
+JUMP *DONE IF B021>0
+CALL JOB:TWAIST
+JUMP *DONE IF I005<>I004
+SET B003 1
+JUMP *DONE
+)";
+
+void insert_after(std::string& text, const std::string& label, const std::string& what, const std::string& added) {
+  const std::size_t at = text.find(what, text.find(label)) + what.size();
+  text.insert(at, added);
+}
+
+std::string shifted(const std::string& text, const std::regex& names, int by) {
+  std::string out;
+  auto rest = text.cbegin();
+  for (std::sregex_iterator at(text.begin(), text.end(), names), end; at != end; ++at) {
+    out.append(rest, (*at)[0].first);
+    std::string number = std::to_string(std::stoi((*at)[2]) + by);
+    out += (*at)[1].str() + std::string((*at)[2].length() - number.size(), '0') + number;
+    rest = (*at)[0].second;
+  }
+  return out.append(rest, text.cend());
+}
+
+}  // namespace
+
+std::string handshake_job() { return kJob; }
+
+std::string handshake_job_of_arm(int arm) {
+  std::string text = kJob;
+  const std::string me = std::to_string(arm);
+  for (const auto& [label, zone] :
+       {std::pair{"*PICK\n", "B020"}, std::pair{"*PLACE\n", "B021"}, std::pair{"*BACK\n", "B020"}})
+    insert_after(text, label, kTaken, "SET B003 3\nJUMP *DONE IF " + std::string(zone) + "<>" + me + "\n");
+  insert_after(text, "'I000", "DONE\n", "'B020 WHO HAS THE BIN, B021 THE RACK\n");
+  if (arm == 1) {
+    insert_after(text, "JUMP *WAY", "B000=4\n", "JUMP *WAIST IF B000=5\n");
+    text.insert(text.find("*WAY\n"), kWaist);
+  } else {
+    text = shifted(text, std::regex("([BI])(00\\d)"), 10);
+    text = shifted(text, std::regex("(P)(0\\d\\d)"), 20);
+    text = std::regex_replace(text, std::regex("#\\(1\\)"), "#(2)");
+    text = std::regex_replace(text, std::regex("RB1"), "RB2");
+  }
+  text = std::regex_replace(text, std::regex("NAME BPICK"), "NAME BPICK" + me);
+  return std::regex_replace(text, std::regex("VISION PICK"), "VISION PICK ARM " + me);
+}
+
+std::string waist_job() {
+  return "/JOB\n//NAME TWAIST\n//INST\n///DATE 2026/01/31 12:00\n///ATTR SC,RW\n///GROUP1 RB1\nNOP\nTIMER T=2.00\n"
+         "SET I005 I004\nEND\n";
 }
 
 }  // namespace tribin::controller_sim

@@ -65,7 +65,8 @@ Outcome position_variable(Machine& machine, const Request& r) {
 
 Outcome where(const Machine& machine, const Request& r) {
   if (r.instance == 1) return of_data(position_data(robot::PulsePosition{machine.pulses(), 0}));
-  if (r.instance == 101) return of_data(position_data(machine.position()));
+  if (r.instance > 100 && r.instance <= 100 + machine.arms())
+    return of_data(position_data(machine.position(r.instance - 100)));
   return {kNoElement, 0, {}};
 }
 

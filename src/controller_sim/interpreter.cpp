@@ -9,6 +9,7 @@ namespace {
 
 constexpr double kInputPoll_s = 0.01;  // how often WAIT IN# looks
 constexpr std::size_t kDeepestCall = 8;
+constexpr int kCycleTaken = 1;     // I001 of the hand-shake, I011 of the second arm's
 constexpr int kJobTrouble = 4400;  // alarm: a job, position or label that is not there
 
 }  // namespace
@@ -72,18 +73,18 @@ const robot::PositionVariable* Machine::find_position(const Instruction& instruc
     const auto at = map.find(instruction.position_index);
     return at == map.end() ? nullptr : &at->second;
   };
-  return instruction.position == 'P' ? find(positions) : find(jobs_.at(stack_.back().job).positions);
+  return instruction.position == 'P' ? find(positions) : find(jobs_.at(task().stack.back().job).positions);
 }
 
 void Machine::step_job() {
   const Instruction* instruction = current();
   if (!instruction) return raise_alarm(kJobTrouble);
-  busy_until_ = now_ + options_.instruction_s;
+  task().busy_until = now_ + options_.instruction_s;
   execute(*instruction);
 }
 
 void Machine::execute(const Instruction& instruction) {
-  std::size_t& at = stack_.back().at;
+  std::size_t& at = task().stack.back().at;
   switch (instruction.operation) {
     case Operation::movj:
     case Operation::movl:
@@ -94,12 +95,13 @@ void Machine::execute(const Instruction& instruction) {
       const bool joint = instruction.operation == Operation::movj;
       robot::CartesianPosition to = *goal;
       if (instruction.operation == Operation::imov)
-        for (int i = 0; i < 3; ++i) to.numbers[i] = at_.numbers[i] + goal->numbers[i];
-      if (interrupted_)
-        to = motion_.goal;  // the move that was stopped goes on: it is not a second one
+        for (int i = 0; i < 3; ++i) to.numbers[i] = task().standing.numbers[i] + goal->numbers[i];
+      if (task().interrupted)
+        to = task().motion.goal;  // the move that was stopped goes on: it is not a second one
       else
-        record({now_, instruction.position, instruction.position_index, integers[1]});
-      interrupted_ = false;
+        record({now_, instruction.position, instruction.position_index,
+                integers[kCycleTaken + 10 * static_cast<int>(task_)], static_cast<int>(task_) + 1});
+      task().interrupted = false;
       const double share = joint ? instruction.speed / 100 : 1;
       begin_motion(to, joint ? share * options_.greatest_speed_mm_s : instruction.speed,
                    share * options_.greatest_turn_deg_s);
@@ -121,19 +123,19 @@ void Machine::execute(const Instruction& instruction) {
       set_value(instruction.target, value_of(instruction.target) - 1);
       break;
     case Operation::timer:
-      busy_until_ = now_ + std::max(instruction.seconds, options_.instruction_s);
+      task().busy_until = now_ + std::max(instruction.seconds, options_.instruction_s);
       break;
     case Operation::jump:
       if (!instruction.condition || holds(*instruction.condition)) {
-        at = jobs_.at(stack_.back().job).labels.at(instruction.text);
+        at = jobs_.at(task().stack.back().job).labels.at(instruction.text);
         return;
       }
       break;
     case Operation::call:
       if (!instruction.condition || holds(*instruction.condition)) {
-        if (!has_job(instruction.text) || stack_.size() >= kDeepestCall) return raise_alarm(kJobTrouble);
+        if (!has_job(instruction.text) || task().stack.size() >= kDeepestCall) return raise_alarm(kJobTrouble);
         ++at;
-        stack_.push_back({instruction.text, 0});
+        task().stack.push_back({instruction.text, 0});
         return;
       }
       break;
@@ -142,25 +144,25 @@ void Machine::execute(const Instruction& instruction) {
       break;
     case Operation::wait_input:
       if (!holds(*instruction.condition)) {
-        if (wait_until_ < 0) wait_until_ = instruction.seconds < 0 ? HUGE_VAL : now_ + instruction.seconds;
-        if (now_ < wait_until_) {
-          busy_until_ = now_ + kInputPoll_s;
+        if (task().wait_until < 0) task().wait_until = instruction.seconds < 0 ? HUGE_VAL : now_ + instruction.seconds;
+        if (now_ < task().wait_until) {
+          task().busy_until = now_ + kInputPoll_s;
           return;
         }
       }
-      wait_until_ = -1;
+      task().wait_until = -1;
       break;
     case Operation::message:
       pendant_text = instruction.text;
       break;
     case Operation::ret:
     case Operation::end:
-      if (stack_.size() > 1) {
-        stack_.pop_back();
+      if (task().stack.size() > 1) {
+        task().stack.pop_back();
       } else {
         at = 0;
         // One cycle ends here; continuous begins again, after a moment even where the job does nothing.
-        if (cycle_mode != 3) running_ = false;
+        if (cycle_mode != 3 && task_ == 0) running_ = false;
       }
       return;
     case Operation::pause:

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tribin/core/error.hpp"
+
 namespace tribin::controller_sim {
 
 using robot::CartesianPosition;
@@ -19,9 +21,17 @@ constexpr int kFirstUserFrame = 2;
 }  // namespace
 
 Machine::Machine(MachineOptions options) : options_(std::move(options)) {
-  at_.numbers = {600, 0, 500, 180, 0, 0};
-  at_.type = 1;
-  at_.tool = 1;
+  for (Task& task : tasks_) {
+    task.standing.numbers = {600, 0, 500, 180, 0, 0};
+    task.standing.type = 1;
+    task.standing.tool = 1;
+  }
+}
+
+void Machine::run_beside(const std::string& job) {
+  if (!has_job(job)) throw Error(ErrorCode::bad_input, "saw no job " + job + ", wanted one for the second arm");
+  tasks_[1].stack.assign(1, {job, 0});
+  tasks_[1].busy_until = now_;
 }
 
 void Machine::add_job(Job job) {
@@ -39,10 +49,11 @@ std::vector<std::string> Machine::job_names() const {
 int Machine::delete_job(const std::string& name) {
   if (!remote_) return 2100;
   if (!has_job(name)) return 4040;
-  for (const Frame& frame : stack_)
-    if (frame.job == name && running_) return 2010;
+  for (const Task& task : tasks_)
+    for (const Frame& frame : task.stack)
+      if (frame.job == name && running_) return 2010;
   jobs_.erase(name);
-  std::erase_if(stack_, [&name](const Frame& frame) { return frame.job == name; });
+  for (Task& task : tasks_) std::erase_if(task.stack, [&name](const Frame& frame) { return frame.job == name; });
   return 0;
 }
 
@@ -57,36 +68,39 @@ robot::ControllerStatus Machine::status() const {
   return s;
 }
 
-Pose Machine::pose_at(double time_s) const {
-  const double u = std::clamp((time_s - motion_.start_s) / std::max(motion_.duration_s, 1e-9), 0.0, 1.0);
+Pose Machine::pose_at(const Motion& motion, double time_s) {
+  const double u = std::clamp((time_s - motion.start_s) / std::max(motion.duration_s, 1e-9), 0.0, 1.0);
   // A trapezoid of speed: a quarter of the time each to start and to stop.
   constexpr double kRamp = 0.25, kTop = 1 / (1 - kRamp);
   const double path = u < kRamp       ? kTop * u * u / (2 * kRamp)
                       : u > 1 - kRamp ? 1 - kTop * (1 - u) * (1 - u) / (2 * kRamp)
                                       : kTop * (u - kRamp / 2);
   Pose pose = Pose::Identity();
-  pose.translation() = (1 - path) * motion_.from.translation() + path * motion_.to.translation();
-  const Vec3 turn = vector_from_rotation(motion_.to.linear() * motion_.from.linear().transpose());
-  pose.linear() = rotation_from_vector(path * turn) * motion_.from.linear();
+  pose.translation() = (1 - path) * motion.from.translation() + path * motion.to.translation();
+  const Vec3 turn = vector_from_rotation(motion.to.linear() * motion.from.linear().transpose());
+  pose.linear() = rotation_from_vector(path * turn) * motion.from.linear();
   return pose;
 }
 
-CartesianPosition Machine::position() const {
-  if (!moving_) return at_;
-  return robot::position_from_pose(pose_at(now_), motion_.goal.type, motion_.goal.tool, motion_.goal.frame);
+CartesianPosition Machine::position(int arm) const {
+  const Task& of = tasks_[static_cast<std::size_t>(arm) - 1];
+  if (!of.moving) return of.standing;
+  const CartesianPosition& goal = of.motion.goal;
+  return robot::position_from_pose(pose_at(of.motion, now_), goal.type, goal.tool, goal.frame);
 }
 
 const Instruction* Machine::current() const {
-  if (stack_.empty()) return nullptr;
-  const auto job = jobs_.find(stack_.back().job);
-  if (job == jobs_.end() || stack_.back().at >= job->second.instructions.size()) return nullptr;
-  return &job->second.instructions[stack_.back().at];
+  if (task().stack.empty()) return nullptr;
+  const Frame& frame = task().stack.back();
+  const auto job = jobs_.find(frame.job);
+  if (job == jobs_.end() || frame.at >= job->second.instructions.size()) return nullptr;
+  return &job->second.instructions[frame.at];
 }
 
 robot::RunningJob Machine::running_job() const {
   const Instruction* instruction = current();
-  if (stack_.empty()) return {};
-  return {stack_.back().job, instruction ? instruction->line : 0, 0};
+  if (task().stack.empty()) return {};
+  return {task().stack.back().job, instruction ? instruction->line : 0, 0};
 }
 
 int Machine::check_ready(bool for_motion) const {
@@ -106,14 +120,14 @@ int Machine::start(const std::string& job) {
   if (job.empty()) {
     if (!current()) return 4060;
     running_ = true;
-    busy_until_ = now_;
+    task().busy_until = now_;
     return 0;
   }
   if (!has_job(job)) return 4040;
-  stack_.assign(1, {job, 0});
-  interrupted_ = false;
-  busy_until_ = now_;
-  wait_until_ = -1;
+  task().stack.assign(1, {job, 0});
+  task().interrupted = false;
+  task().busy_until = now_;
+  task().wait_until = -1;
   running_ = true;
   return 0;
 }
@@ -123,21 +137,22 @@ int Machine::select(const std::string& job, int line) {
   if (running_) return 2010;
   if (!has_job(job)) return 4040;
   if (line < 0 || line >= static_cast<int>(jobs_.at(job).instructions.size())) return 1012;
-  stack_.assign(1, {job, static_cast<std::size_t>(line)});
-  interrupted_ = false;
-  wait_until_ = -1;
+  task().stack.assign(1, {job, static_cast<std::size_t>(line)});
+  task().interrupted = false;
+  task().wait_until = -1;
   return 0;
 }
 
 /// What moves stands still where it is; a job that goes on later begins with the instruction that was stopped.
 void Machine::stop() {
-  if (moving_) {
-    at_ = position();
-    moving_ = false;
-    interrupted_ = !host_move_;
-    host_move_ = false;
+  for (int arm = 1; arm <= 2; ++arm) {
+    Task& stopped = tasks_[static_cast<std::size_t>(arm) - 1];
+    if (!stopped.moving) continue;
+    stopped.standing = position(arm);
+    stopped.moving = false;
+    stopped.interrupted = !host_move_;
   }
-  running_ = false;
+  host_move_ = running_ = false;
 }
 
 int Machine::hold(bool on) {
@@ -230,10 +245,10 @@ int Machine::move(const CartesianPosition& to, double speed_mm_s, bool relative)
   if (to.frame >= kFirstUserFrame && !user_frames.count(to.frame - kFirstUserFrame + 1)) return 3350;
   CartesianPosition goal = to;
   if (relative) {
-    Pose pose = pose_of(at_);
+    Pose pose = pose_of(task().standing);
     pose.translation() += pose_of(to).translation();
     pose.linear() = pose_of(to).linear() * pose.linear();
-    goal = robot::position_from_pose(pose, at_.type, to.tool, to.frame);
+    goal = robot::position_from_pose(pose, task().standing.type, to.tool, to.frame);
   }
   record({now_, 'H', 0, integers[1]});
   running_ = host_move_ = true;
@@ -245,51 +260,64 @@ int Machine::move(const CartesianPosition& to, double speed_mm_s, bool relative)
 int Machine::move_pulses(const robot::PulsePosition& to) {
   if (const int refused = check_ready(true)) return refused;
   pulses_ = to.pulses;
-  return move(at_, options_.greatest_speed_mm_s);
+  return move(task().standing, options_.greatest_speed_mm_s);
 }
 
 int Machine::begin_motion(const CartesianPosition& to, double speed_mm_s, double turn_deg_s) {
-  motion_.goal = to;
-  motion_.from = pose_of(at_);
-  motion_.to = pose_of(to);
-  if (options_.reachable && !options_.reachable(motion_.to)) {
+  task().motion.goal = to;
+  task().motion.from = pose_of(task().standing);
+  task().motion.to = pose_of(to);
+  if (options_.reachable && !options_.reachable(task().motion.to)) {
     raise_alarm(kUnreachable);
     return kUnreachable;
   }
-  motion_.length_mm = (motion_.to.translation() - motion_.from.translation()).norm();
-  const double turn_deg = rotation_angle(motion_.from.linear(), motion_.to.linear()) / kDegree;
+  task().motion.length_mm = (task().motion.to.translation() - task().motion.from.translation()).norm();
+  const double turn_deg = rotation_angle(task().motion.from.linear(), task().motion.to.linear()) / kDegree;
   const double speed = std::min(speed_mm_s, options_.greatest_speed_mm_s), a = options_.acceleration_mm_s2;
-  const double straight = motion_.length_mm > speed * speed / a ? motion_.length_mm / speed + speed / a
-                                                                : 2 * std::sqrt(motion_.length_mm / a);
-  motion_.start_s = now_;
-  motion_.duration_s = std::max(straight, turn_deg / turn_deg_s);
-  moving_ = true;
+  const double straight = task().motion.length_mm > speed * speed / a ? task().motion.length_mm / speed + speed / a
+                                                                      : 2 * std::sqrt(task().motion.length_mm / a);
+  task().motion.start_s = now_;
+  task().motion.duration_s = std::max(straight, turn_deg / turn_deg_s);
+  task().moving = true;
   return 0;
+}
+
+/// The task whose move, timer or instruction ends first.
+bool Machine::take_next_task(double& due_s) {
+  bool found = false;
+  for (std::size_t i = 0; i < tasks_.size(); ++i) {
+    const Task& of = tasks_[i];
+    if (i > 0 && of.stack.empty()) continue;
+    const double due = std::max(now_, of.moving ? of.motion.start_s + of.motion.duration_s : of.busy_until);
+    if (found && due >= due_s) continue;
+    due_s = due, task_ = i, found = true;
+  }
+  return found;
 }
 
 void Machine::advance(double until_s) {
   // Each round ends a move, a timer or an instruction that costs time: the loop always comes to its end.
   while (now_ < until_s) {
-    if (!running_) {
+    double due = until_s;
+    if (!running_ || !take_next_task(due) || due > until_s) {
       now_ = until_s;
-    } else if (moving_) {
-      const double done = motion_.start_s + motion_.duration_s;
-      now_ = std::min(done, until_s);
-      if (done > until_s) return;
-      at_ = motion_.goal;
-      moving_ = false;
-      if (host_move_) {
+      break;
+    }
+    now_ = due;
+    Task& at_work = task();
+    if (at_work.moving) {
+      at_work.standing = at_work.motion.goal;
+      at_work.moving = false;
+      if (host_move_ && task_ == 0) {
         host_move_ = running_ = false;
-      } else if (!stack_.empty()) {
-        ++stack_.back().at;
+      } else if (!at_work.stack.empty()) {
+        ++at_work.stack.back().at;
       }
-    } else {
-      now_ = std::max(now_, std::min(busy_until_, until_s));
-      if (busy_until_ > now_) return;
-      if (now_ >= until_s) return;
+    } else if (now_ < until_s) {
       step_job();
     }
   }
+  task_ = 0;
 }
 
 }  // namespace tribin::controller_sim

@@ -34,7 +34,7 @@ std::string position_text(const CartesianPosition& position, int decimals) {
 }
 
 std::string position_answer(Wire& wire, std::optional<Fault> fault, bool external) {
-  const CartesianPosition position = wire.machine.position();
+  const CartesianPosition position = wire.machine.position(wire.arm);
   std::string line = position_text(position, wire.angle_decimals).substr(2);  // without its form
   line.erase(0, line.find(',') + 1);                                          // and its frame
   if (external) line += ",0,0,0,0,0,0";
@@ -296,7 +296,14 @@ CommandAnswer nx100_answer(Wire& wire, const std::string& command, const std::st
     m.pendant_text = data;
     return done(0);
   }
-  if (command == "CGROUP" || command == "CTASK") return n ? done(0) : refused(1011);
+  if (command == "CTASK") return n ? done(0) : refused(1011);
+  if (command == "CGROUP") {
+    if (!n || n->size() != 2) return refused(1011);
+    const int bits = static_cast<int>((*n)[0]);
+    if (bits < 1 || bits > m.arms()) return refused(3370);
+    wire.arm = bits;
+    return done(0);
+  }
   const bool is_mode = command == "MODE", is_cycle = command == "CYCLE";
   if (is_mode || is_cycle || command == "SVON" || command == "HOLD" || command == "HLOCK") {
     if (!n || n->size() != 1) return refused(1011);

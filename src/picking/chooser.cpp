@@ -24,7 +24,7 @@ PlaceError error_of(const WorkCell& cell, const Choice& choice) {
   error.pose = std::sqrt(std::max(
       0.0, Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(Eigen::Matrix3d(position)).eigenvalues().maxCoeff()));
   error.hand_eye = cell.hand_eye.sigma_mm;
-  error.robot = cell.robots.front().sigma_mm;
+  error.robot = cell.robots.front().sigma_mm;  // one controller, one accuracy
   for (const Gripper& gripper : cell.grippers)
     if (gripper.name == choice.grasp.gripper) error.grip = gripper.slip_mm;
   return error;
@@ -33,8 +33,8 @@ PlaceError error_of(const WorkCell& cell, const Choice& choice) {
 }  // namespace
 
 Chooser::Chooser(const WorkCell& cell, const robot::RobotModel& robot, Vision& vision,
-                 const robot::SafetyLimits& limits)
-    : cell_(cell), robot_(robot), vision_(vision), limits_(limits) {
+                 const robot::SafetyLimits& limits, std::size_t number)
+    : cell_(cell), robot_(robot), vision_(vision), limits_(limits), number_(number) {
   const auto want = [&cell](bool there, const char* what) {
     if (!there)
       throw Error(ErrorCode::bad_input, cell.file.string() + ": saw no " + what + ", wanted one to pick and place");
@@ -65,10 +65,35 @@ const grasp::GripperShape& Chooser::shape(const std::string& gripper) const {
   return shapes_[static_cast<std::size_t>(tool_of(gripper)) - 1];
 }
 
-ArmWithTool Chooser::arm_with(const std::string& gripper) const {
+std::vector<std::string> Chooser::own_grippers() const {
+  if (!cell_.robots[number_].grippers.empty()) return cell_.robots[number_].grippers;
+  std::vector<std::string> names;
+  for (const Gripper& gripper : cell_.grippers) names.push_back(gripper.name);
+  return names;
+}
+
+void Chooser::stand_among(double waist, std::vector<grasp::Convex> others) {
+  waist_ = waist;
+  others_ = std::move(others);
+}
+
+Pose Chooser::wait() const {
+  if (!waits()) return Pose::Identity();
+  const robot::Arm& arm = arm_of(cell_, robot_, number_);
+  return base_from_arm(robot_, arm, waist_) * base_from_arm(robot_, arm).inverse() * *cell_.robots[number_].wait;
+}
+
+ArmWithTool Chooser::arm_with(const std::string& gripper, const Entry* held) const {
   ArmWithTool arm;
   arm.robot = &robot_;
-  arm.arm = &arm_of(cell_, robot_);
+  arm.arm = &arm_of(cell_, robot_, number_);
+  arm.waist = waist_;
+  if (waits()) {
+    arm.others = others_;
+    for (const grasp::Convex& piece : grasp::pieces_at(shape(gripper), shape(gripper).stroke_max()))
+      arm.on_tcp.push_back(piece);
+    if (held) arm.on_tcp.push_back(box_of(vision_.model(held->part), held->tcp_from_part));
+  }
   arm.flange_from_tcp = shape(gripper).gripper.flange_from_tcp;
   arm.workspace = cell_.safety.workspace_mm;
   arm.limit_margin_rad = limits_.limit_margin_rad;
@@ -101,22 +126,35 @@ grasp::PlanOptions Chooser::plan_options(Resort resort, std::vector<grasp::Faile
   options.most_per_part = closely ? kMostDirect : kMostPerPart;
   options.failed = std::move(failed);
   if (resort < Resort::full_tilt) options.max_tilt_rad = kFirstTilt;
+  if (!cell_.robots[number_].grippers.empty() && resort != Resort::none) options.grippers = own_grippers();
   if (resort == Resort::none)
     for (const CellPart& part : cell_.parts) {
-      const std::string& first = part.grippers.empty() ? cell_.grippers.front().name : part.grippers.front();
+      const std::vector<std::string> own = own_grippers(), &all = part.grippers.empty() ? own : part.grippers;
+      const auto mine = std::find_if(all.begin(), all.end(), [&](const std::string& name) {
+        return std::find(own.begin(), own.end(), name) != own.end();
+      });
+      if (mine == all.end()) continue;
+      const std::string& first = *mine;
       if (std::find(options.grippers.begin(), options.grippers.end(), first) == options.grippers.end())
         options.grippers.push_back(first);
     }
   return options;
 }
 
-std::optional<std::vector<Stop>> Chooser::way(const Start& start, const Pose& base_from_tcp,
-                                              const std::string& gripper) const {
-  ArmWithTool arm = arm_with(gripper);
+std::optional<std::vector<Stop>> Chooser::way(const Start& start, const Pose& base_from_tcp, const std::string& gripper,
+                                              const Entry* held) const {
+  auto stops = whole_way(start, base_from_tcp, gripper, held);
+  if (stops) stops->pop_back();
+  return stops;
+}
+
+std::optional<std::vector<Stop>> Chooser::whole_way(const Start& start, const Pose& base_from_tcp,
+                                                    const std::string& gripper, const Entry* held) const {
+  ArmWithTool arm = arm_with(gripper, held);
   arm.singularity = 0;  // these are moves of the joints
   const Pose from = start.base_from_flange * arm.flange_from_tcp;
   const Vec3 bin = cell_.bin ? cell_.bin->base_from_bin.translation() : base_from_tcp.translation();
-  std::vector<Pose> poses = way_between(from, base_from_tcp, travel_mm(), cell_.robots.front().way_points, bin);
+  std::vector<Pose> poses = way_between(from, base_from_tcp, travel_mm(), cell_.robots[number_].way_points, bin);
   poses.push_back(base_from_tcp);  // the last piece leads there
   auto stops = stops_at(arm, poses, start.joints, false);
   if (!stops) return {};
@@ -125,7 +163,6 @@ std::optional<std::vector<Stop>> Chooser::way(const Start& start, const Pose& ba
     const Stop begin = start.joints ? Stop{from, *start.joints} : stops->front();
     if (!arm_is_clear(arm, begin, *stops, bodies_of(*cell_.bin))) return {};
   }
-  stops->pop_back();
   return stops;
 }
 
@@ -152,12 +189,12 @@ std::optional<Placing> Chooser::place(const Entry& held, const Filling& filling,
   const Held in_hand{&vision_.model(held.part), &shape(held.gripper), held.opening_mm, held.tcp_from_part};
   const Pose flange_from_tcp = shape(held.gripper).gripper.flange_from_tcp;
   const auto has_ways = [&](const Placing& p) {
-    if (!way(start, p.stops[0].base_from_tcp, held.gripper)) return false;
+    if (!way(start, p.stops[0].base_from_tcp, held.gripper, &held)) return false;
     if (!cell_.bin) return true;
-    if (!arm_is_clear(arm_with(held.gripper), p.stops[0], std::span(p.stops).subspan(1), bodies_of(*cell_.bin)))
+    if (!arm_is_clear(arm_with(held.gripper, &held), p.stops[0], std::span(p.stops).subspan(1), bodies_of(*cell_.bin)))
       return false;
     const Start after{p.stops[2].base_from_tcp * flange_from_tcp.inverse(), p.stops[2].joints};
-    return way(after, over_bin(), held.gripper).has_value();
+    return way(after, next_place(held.gripper), held.gripper).has_value();
   };
   auto placing = plan_place(arm_with(held.gripper), in_hand, open, stands, standing, has_ways);
   if (placing && placing->slot == &station) placing->slot = nullptr;
@@ -183,8 +220,16 @@ std::optional<Choice> Chooser::choose(const grasp::Plan& plan, const Filling& fi
       held.part = grasp.part_name, held.gripper = grasp.gripper, held.opening_mm = grasp.opening_before_mm;
       held.tcp_from_part = grasp.part_from_tcp.inverse();
       const grasp::PathPoint& retreat = grasp.path.back();
-      const Pose flange = retreat.base_from_tcp * shape(grasp.gripper).gripper.flange_from_tcp.inverse();
-      auto placing = place(held, filling, {flange, retreat.joints}, where);
+      Start carried{retreat.base_from_tcp * shape(grasp.gripper).gripper.flange_from_tcp.inverse(), retreat.joints};
+      if (waits()) {
+        const auto back = whole_way(carried, next_place(grasp.gripper), grasp.gripper, &held);
+        if (!back) {
+          ++no_way;
+          continue;
+        }
+        carried = {wait(), back->back().joints};
+      }
+      auto placing = place(held, filling, carried, where);
       if (!placing) {
         ++no_place;
         continue;
@@ -221,6 +266,10 @@ std::vector<robot::Refusal> Chooser::refusals_of(const Choice& choice, double sc
   for (robot::Refusal& refusal : robot::refusals(facts, limits_))
     if (of_motion(refusal.code)) out.push_back(std::move(refusal));
   return out;
+}
+
+Pose Chooser::next_place(const std::string& gripper) const {
+  return waits() ? Pose(wait() * shape(gripper).gripper.flange_from_tcp) : over_bin();
 }
 
 Pose Chooser::over_bin() const {

@@ -21,14 +21,25 @@ struct Choice {
 class Chooser {
  public:
   /// \throws Error bad_input where the cell lacks a rack, a gripper or a robot
-  Chooser(const WorkCell& cell, const robot::RobotModel& robot, Vision& vision, const robot::SafetyLimits& limits);
+  /// \param number  of the arm: index into WorkCell::robots
+  Chooser(const WorkCell& cell, const robot::RobotModel& robot, Vision& vision, const robot::SafetyLimits& limits,
+          std::size_t number = 0);
 
   const std::vector<Slot>& slots() const { return slots_; }
   /// The parts that a slot waits for, with all poses in which it may stand in one, or at the station.
   Places places(const Filling& filling) const;
   /// \param closely  more grasps of each part, where few do not lead to a slot
   grasp::PlanOptions plan_options(Resort resort, std::vector<grasp::FailedPick> failed, bool closely = false) const;
-  bool has_more_grippers() const { return cell_.grippers.size() > 1; }
+  bool has_more_grippers() const { return own_grippers().size() > 1; }
+  /// Those that sit on the arm, in the file's order.
+  std::vector<std::string> own_grippers() const;
+
+  /// Of two arms: the waist's angle, and where the other one is, or may be meanwhile.
+  void stand_among(double waist, std::vector<grasp::Convex> others);
+  /// base_from_flange where it waits; the identity for a single arm.
+  Pose wait() const;
+  bool waits() const { return cell_.robots.size() > 1 && cell_.robots[number_].wait.has_value(); }
+  int arm_number() const { return static_cast<int>(number_) + 1; }
 
   /// Where the arm stands.
   struct Start {
@@ -55,14 +66,21 @@ class Chooser {
   /// The first place of that kind for a part that is held like this. \param start  where its way begins
   std::optional<Placing> place(const Entry& held, const Filling& filling, const Start& start, Where where) const;
   /// The stops of a way; none where it is out of reach.
-  std::optional<std::vector<Stop>> way(const Start& start, const Pose& base_from_tcp, const std::string& gripper) const;
+  std::optional<std::vector<Stop>> way(const Start& start, const Pose& base_from_tcp, const std::string& gripper,
+                                       const Entry* held = nullptr) const;
+  /// The same with the place where it leads as its last stop.
+  std::optional<std::vector<Stop>> whole_way(const Start& start, const Pose& base_from_tcp, const std::string& gripper,
+                                             const Entry* held = nullptr) const;
 
-  ArmWithTool arm_with(const std::string& gripper) const;
+  /// \param held  what the gripper holds then: two arms keep it clear of each other
+  ArmWithTool arm_with(const std::string& gripper, const Entry* held = nullptr) const;
   const grasp::GripperShape& shape(const std::string& gripper) const;
   int tool_of(const std::string& gripper) const;  ///< number on the controller, from 1 in the file's order
   const CellPart& cell_part(const std::string& name) const;
   bool has_station() const { return cell_.regrasp.has_value(); }
   Pose over_bin() const;  ///< the tool above the bin, at the height of its ways
+  /// Where the tool goes when its part is put down: over the bin, or to where one of two arms waits.
+  Pose next_place(const std::string& gripper) const;
   /// The TCP's height at which nothing is in the way.
   double travel_mm() const;
   /// Reasons of software against the motion, the controller's state aside.
@@ -73,6 +91,9 @@ class Chooser {
   const robot::RobotModel& robot_;
   Vision& vision_;
   const robot::SafetyLimits& limits_;
+  std::size_t number_;
+  double waist_ = 0;
+  std::vector<grasp::Convex> others_;
   std::vector<Slot> slots_;
   std::vector<grasp::GripperShape> shapes_;
 };

@@ -220,6 +220,8 @@ Phase Run::place() {
   return Phase::scan;
 }
 
-RunEnd run_picking(const RunLinks& links, const RunOptions& options) { return Run(links, options).go(); }
+RunEnd run_picking(const RunLinks& links, const RunOptions& options) {
+  return links.cell->robots.size() > 1 ? pick_with_two_arms(links, options) : Run(links, options).go();
+}
 
 }  // namespace tribin::picking

@@ -56,11 +56,12 @@ void follow(JournalState& state, const Entry& entry, const std::string& where) {
     if (slot && !slot_of(slot).empty())
       cannot_follow(where, entry, "in slot " + std::to_string(slot) + ", where " + slot_of(slot) + " stands");
   };
-  if (entry.cycle) state.last_cycle = entry.cycle;
+  HandState& hand = state.hand(entry.arm);
+  if (entry.cycle) hand.last_cycle = entry.cycle;
   state.last_scene = std::max(state.last_scene, entry.scene);
   const bool ended = entry.event == Event::picked || entry.event == Event::missed || entry.event == Event::placed ||
                      entry.event == Event::lost || entry.event == Event::moved;
-  if (ended && entry.cycle) state.last_taken = entry.cycle;
+  if (ended && entry.cycle) hand.last_taken = entry.cycle;
   switch (entry.event) {
     case Event::new_rack:
       state.filling.assign(state.filling.size(), {});
@@ -68,26 +69,26 @@ void follow(JournalState& state, const Entry& entry, const std::string& where) {
       break;
     case Event::pick_ordered:
     case Event::move_ordered:
-      state.open = entry;
+      hand.open = entry;
       break;
     case Event::place_ordered:
       must_be_empty(entry.slot);
-      state.open = entry;
+      hand.open = entry;
       break;
     case Event::picked:
-      state.open.reset();
+      hand.open.reset();
       if (entry.from_station) state.at_station.reset();
-      state.in_hand = entry;
+      hand.in_hand = entry;
       break;
     case Event::missed:
     case Event::moved:
     case Event::not_taken:
-      state.open.reset();
+      hand.open.reset();
       break;
     case Event::placed:
       must_be_empty(entry.slot);
-      state.open.reset();
-      state.in_hand.reset();
+      hand.open.reset();
+      hand.in_hand.reset();
       if (entry.slot) {
         slot_of(entry.slot) = entry.part;
         ++state.placed;
@@ -96,13 +97,13 @@ void follow(JournalState& state, const Entry& entry, const std::string& where) {
       }
       break;
     case Event::lost:
-      state.open.reset();
-      state.in_hand.reset();
+      hand.open.reset();
+      hand.in_hand.reset();
       break;
     case Event::operator_said:
       // A part in the slot, or none; the hand is empty either way: the operator has seen to it.
-      state.open.reset();
-      state.in_hand.reset();
+      hand.open.reset();
+      hand.in_hand.reset();
       state.at_station.reset();
       if (entry.slot) {
         state.placed += static_cast<int>(!entry.part.empty()) - static_cast<int>(!slot_of(entry.slot).empty());

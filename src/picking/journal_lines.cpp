@@ -14,7 +14,7 @@ constexpr std::array kNames = {"new_rack", "pick_ordered", "picked", "missed",  
 Entry entry_of(const io::JsonPlace& line) {
   line.must_be_object("a journal entry");
   line.only_keys({"event", "cycle", "scene", "part", "gripper", "grasp", "slot", "base_from_part", "tcp_from_part",
-                  "opening_mm", "from_station", "note"});
+                  "opening_mm", "from_station", "note", "arm"});
   const auto text = [&line](const char* key) {
     return line.has(key) ? line.at(key, "a text").text("a text") : std::string();
   };
@@ -28,6 +28,7 @@ Entry entry_of(const io::JsonPlace& line) {
   if (known == kNames.end()) event.fail("an event that this version knows");
   entry.event = static_cast<Event>(known - kNames.begin());
   entry.cycle = whole("cycle"), entry.scene = whole("scene"), entry.slot = whole("slot");
+  if (line.has("arm")) entry.arm = line.at("arm", "1 or 2").whole(1, 2, "1 or 2");
   entry.part = text("part"), entry.gripper = text("gripper"), entry.grasp = text("grasp"), entry.note = text("note");
   if (line.has("base_from_part")) entry.base_from_part = io::pose_of(line.at("base_from_part", "a pose"));
   if (line.has("tcp_from_part")) entry.tcp_from_part = io::pose_of(line.at("tcp_from_part", "a pose"));
@@ -48,6 +49,7 @@ std::string line_of(const Entry& entry) {
   nlohmann::ordered_json json;
   json["event"] = name_of(entry.event);
   if (entry.cycle) json["cycle"] = entry.cycle;
+  if (entry.arm != 1) json["arm"] = entry.arm;
   if (entry.scene) json["scene"] = entry.scene;
   if (!entry.part.empty()) {
     json["part"] = entry.part;

@@ -13,27 +13,19 @@ const Chooser::Start& Run::here() {
   return *here_;
 }
 
-robot::CycleResult Run::order(Entry entry, robot::CycleCommand command, const std::vector<Stop>& stops,
-                              const std::string& gripper, double opening_mm, int part_class) {
+robot::CycleOrder order_of(const Entry& entry, robot::CycleCommand command, const Chooser& chooser,
+                           const robot::Arm& arm, const std::vector<Stop>& stops, const std::string& gripper) {
   robot::CycleOrder order;
   order.command = command;
-  order.cycle = entry.cycle = robot::next_cycle(now().last_cycle);
-  order.part_class = part_class;
-  order.opening_mm = opening_mm;
-  const robot::Arm& arm = arm_of(*links_.cell, *links_.robot);
+  order.cycle = entry.cycle;
+  const int frame = chooser.waits() ? 0 : 1;
   for (const Stop& stop : stops)
-    order.positions.push_back(
-        robot::position_from_pose(stop.base_from_tcp, robot::form_bits(arm, stop.joints), chooser_.tool_of(gripper)));
-  report_.cycle = order.cycle;
-  journal_.write(entry);
-  const robot::CycleResult result = robot::run_cycle(*links_.controller, *links_.clock, order, options_.handshake);
-  here_ = Chooser::Start{stops.back().base_from_tcp * chooser_.shape(gripper).gripper.flange_from_tcp.inverse(),
-                         stops.back().joints};
-  note_end(entry, result);
-  return result;
+    order.positions.push_back(robot::position_from_pose(stop.base_from_tcp, robot::form_bits(arm, stop.joints),
+                                                        chooser.tool_of(gripper), frame));
+  return order;
 }
 
-void Run::note_end(const Entry& order, robot::CycleResult result) {
+Entry end_of(const Entry& order, robot::CycleResult result) {
   Entry end = order;
   const bool done = result == robot::CycleResult::done;
   switch (order.event) {
@@ -46,10 +38,29 @@ void Run::note_end(const Entry& order, robot::CycleResult result) {
     default:
       end.event = Event::moved;
   }
-  journal_.write(end);
+  return end;
+}
+
+void must_be_no_fault(const Entry& order, robot::CycleResult result) {
   if (result == robot::CycleResult::fault)
     throw Error(ErrorCode::device, "the robot's job ended cycle " + std::to_string(order.cycle) +
                                        " with a fault; look at its pendant, then start again");
+}
+
+robot::CycleResult Run::order(Entry entry, robot::CycleCommand command, const std::vector<Stop>& stops,
+                              const std::string& gripper, double opening_mm, int part_class) {
+  entry.cycle = robot::next_cycle(now().last_cycle);
+  robot::CycleOrder order = order_of(entry, command, chooser_, arm_of(*links_.cell, *links_.robot), stops, gripper);
+  order.part_class = part_class;
+  order.opening_mm = opening_mm;
+  report_.cycle = order.cycle;
+  journal_.write(entry);
+  const robot::CycleResult result = robot::run_cycle(*links_.controller, *links_.clock, order, options_.handshake);
+  here_ = Chooser::Start{stops.back().base_from_tcp * chooser_.shape(gripper).gripper.flange_from_tcp.inverse(),
+                         stops.back().joints};
+  journal_.write(end_of(entry, result));
+  must_be_no_fault(entry, result);
+  return result;
 }
 
 const Gripper& Run::gripper_now() const {
@@ -108,6 +119,19 @@ FlangePose Run::go_to_look() {
       [this] { return Pose(robot::pose_of(links_.controller->position()) * gripper_now().flange_from_tcp.inverse()); };
 }
 
+Entry pick_of(const Choice& choice, int scene) {
+  const grasp::Grasp& grasp = choice.grasp;
+  Entry entry;
+  entry.event = Event::pick_ordered;
+  entry.scene = scene;
+  entry.part = grasp.part_name, entry.gripper = grasp.gripper, entry.grasp = grasp.family;
+  entry.slot = choice.placing.slot ? choice.placing.slot->number : 0;
+  entry.base_from_part = choice.part.base_from_part;
+  entry.tcp_from_part = grasp.part_from_tcp.inverse();
+  entry.opening_mm = grasp.opening_before_mm;
+  return entry;
+}
+
 bool Run::carry_out_pick(const Choice& choice, int scene, bool from_station) {
   const grasp::Grasp& grasp = choice.grasp;
   std::vector<Stop> stops;
@@ -122,15 +146,8 @@ bool Run::carry_out_pick(const Choice& choice, int scene, bool from_station) {
   }
   for (const grasp::Step step : {grasp::Step::pre_pick, grasp::Step::pick, grasp::Step::retreat})
     stops.push_back({grasp.at(step)->base_from_tcp, grasp.at(step)->joints});
-  Entry entry;
-  entry.event = Event::pick_ordered;
-  entry.scene = scene;
-  entry.part = grasp.part_name, entry.gripper = grasp.gripper, entry.grasp = grasp.family;
-  entry.slot = choice.placing.slot ? choice.placing.slot->number : 0;
+  Entry entry = pick_of(choice, scene);
   entry.from_station = from_station;
-  entry.base_from_part = choice.part.base_from_part;
-  entry.tcp_from_part = grasp.part_from_tcp.inverse();
-  entry.opening_mm = grasp.opening_before_mm;
   const int part_class = static_cast<int>(&chooser_.cell_part(grasp.part_name) - links_.cell->parts.data()) + 1;
   return order(entry, robot::CycleCommand::pick, stops, grasp.gripper, grasp.opening_before_mm, part_class) ==
          robot::CycleResult::done;

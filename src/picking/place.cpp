@@ -7,14 +7,9 @@ namespace {
 
 constexpr double kAbove_mm = 100;           // a part is lowered into its slot from there, the tool goes back at least
 constexpr double kClear_mm = 2;             // gripper and what stands in the rack: a robot's error, three times
+constexpr double kArmsClear_mm = 30;        // between two arms: half of the way between looks at them
 constexpr double kPartClear_mm = 0.5;       // of parts: how close they stand is the rack's business
 constexpr double kMostTurn = 10 * kDegree;  // of a tool that points up, from the level: nothing is placed from below
-
-grasp::Convex box_of(const Part& part, const Pose& base_from_part) {
-  Pose box = base_from_part;
-  box.translation() = base_from_part * Vec3((part.box_min + part.box_max) / 2);
-  return grasp::make_box(box, part.box_max - part.box_min);
-}
 
 grasp::Convex swept(grasp::Convex body, const Vec3& way) {
   body.sweep_mm = way;
@@ -60,10 +55,16 @@ bool is_clear(const Held& held, const std::array<Pose, 3>& tcp, const Pose& base
 
 }  // namespace
 
+grasp::Convex box_of(const Part& part, const Pose& frame_from_part) {
+  Pose box = frame_from_part;
+  box.translation() = frame_from_part * Vec3((part.box_min + part.box_max) / 2);
+  return grasp::make_box(box, part.box_max - part.box_min);
+}
+
 std::optional<std::vector<Stop>> stops_at(const ArmWithTool& arm, std::span<const Pose> base_from_tcp,
                                           const std::optional<robot::Joints>& from, bool one_form) {
   std::vector<Stop> stops;
-  const Pose arm_from_base = base_from_arm(*arm.robot, *arm.arm).inverse(),
+  const Pose arm_from_base = base_from_arm(*arm.robot, *arm.arm, arm.waist).inverse(),
              tcp_from_flange = arm.flange_from_tcp.inverse();
   robot::ReachOptions options;
   options.from = from;
@@ -131,17 +132,38 @@ std::vector<Pose> way_between(const Pose& from, const Pose& to, double travel_mm
   return way;
 }
 
-bool arm_is_clear(const ArmWithTool& arm, const Stop& from, std::span<const Stop> way,
-                  std::span<const grasp::Convex> bodies) {
+namespace {
+
+/// An arm and what it carries, at one place of a way.
+struct ArmBodies {
+  std::vector<grasp::Convex> links, carried;
+};
+
+ArmBodies pieces_of(const ArmWithTool& arm, const robot::Joints& joints) {
+  ArmBodies bodies{grasp::arm_bodies(*arm.robot, *arm.arm, arm.waist, joints), {}};
+  if (arm.on_tcp.empty()) return bodies;
+  const Pose tcp =
+      base_from_arm(*arm.robot, *arm.arm, arm.waist) * arm_from_flange(*arm.arm, joints) * arm.flange_from_tcp;
+  for (const grasp::Convex& piece : arm.on_tcp) bodies.carried.push_back(grasp::moved(tcp, piece));
+  return bodies;
+}
+
+/// Without the pieces that stand still: both arms of a robot have the same body.
+std::span<const grasp::Convex> moving(const ArmWithTool& arm, const std::vector<grasp::Convex>& links) {
+  std::size_t still = 0;
+  while (still < arm.arm->capsules.size() && arm.arm->capsules[still].link == 0) ++still;
+  return std::span(links).subspan(still);
+}
+
+/// Tells `look` of an arm along a way, piece by piece: straight in the joints, and straight in space where the arm can
+/// follow that. Ends where it says false.
+bool along_way(const ArmWithTool& arm, const Stop& from, std::span<const Stop> way,
+               const std::function<bool(std::size_t move, const ArmBodies&)>& look) {
   constexpr double kStep_mm = 60, kStep = 10 * kDegree;  // between looks: less than the links are thick
-  const Pose arm_from_base = base_from_arm(*arm.robot, *arm.arm).inverse();
-  const auto clear = [&](const robot::Joints& joints) {
-    for (const grasp::Convex& link : grasp::arm_bodies(*arm.robot, *arm.arm, 0, joints))
-      if (!clear_of(link, bodies, kClear_mm)) return false;
-    return true;
-  };
+  const Pose arm_from_base = base_from_arm(*arm.robot, *arm.arm, arm.waist).inverse();
   Stop last = from;
-  for (const Stop& stop : way) {
+  for (std::size_t move_number = 0; move_number < way.size(); ++move_number) {
+    const Stop& stop = way[move_number];
     const Vec3 move = stop.base_from_tcp.translation() - last.base_from_tcp.translation();
     const Vec3 turn = vector_from_rotation(stop.base_from_tcp.linear() * last.base_from_tcp.linear().transpose());
     const int steps = 1 + static_cast<int>(std::max(move.norm() / kStep_mm, turn.norm() / kStep));
@@ -152,18 +174,67 @@ bool arm_is_clear(const ArmWithTool& arm, const Stop& from, std::span<const Stop
       const double share = static_cast<double>(i) / steps;
       robot::Joints joints{};
       for (std::size_t k = 0; k < joints.size(); ++k) joints[k] = (1 - share) * last.joints[k] + share * stop.joints[k];
-      if (!clear(joints)) return false;
+      if (!look(move_number, pieces_of(arm, joints))) return false;
       Pose pose = last.base_from_tcp;
       pose.translation() += share * move;
       pose.linear() = rotation_from_vector(share * turn) * last.base_from_tcp.linear();
       const auto reached = reach(*arm.arm, arm_from_base * pose * arm.flange_from_tcp.inverse(), options);
       if (!reached) continue;  // a move of the joints does not come there
-      if (!clear(reached->joints)) return false;
+      if (!look(move_number, pieces_of(arm, reached->joints))) return false;
       options.from = reached->joints;
     }
     last = stop;
   }
   return true;
+}
+
+}  // namespace
+
+bool arm_is_clear(const ArmWithTool& arm, const Stop& from, std::span<const Stop> way,
+                  std::span<const grasp::Convex> bodies) {
+  const auto clear = [&](std::span<const grasp::Convex> pieces, std::span<const grasp::Convex> of, double gap_mm) {
+    return std::all_of(pieces.begin(), pieces.end(),
+                       [&](const grasp::Convex& piece) { return clear_of(piece, of, gap_mm); });
+  };
+  return along_way(arm, from, way, [&](std::size_t, const ArmBodies& at) {
+    return clear(at.links, bodies, kClear_mm) && clear(moving(arm, at.links), arm.others, kArmsClear_mm) &&
+           clear(at.carried, arm.others, kArmsClear_mm);
+  });
+}
+
+std::vector<grasp::Convex> bodies_at(const ArmWithTool& arm, const robot::Joints& joints) {
+  ArmBodies at = pieces_of(arm, joints);
+  const auto links = moving(arm, at.links);
+  at.carried.insert(at.carried.end(), links.begin(), links.end());
+  return std::move(at.carried);
+}
+
+std::vector<grasp::Convex> room_of_way(const ArmWithTool& arm, const Stop& from, std::span<const Stop> way) {
+  struct Room {
+    Vec3 min = Vec3::Constant(1e300), max = Vec3::Constant(-1e300);
+  };
+  std::vector<std::vector<Room>> rooms(way.size());
+  const auto widen = [](Room& room, const grasp::Convex& body) {
+    for (int k = 0; k < 3; ++k) {
+      room.max[k] = std::max(room.max[k], grasp::reach_along(body, Vec3::Unit(k)));
+      room.min[k] = std::min(room.min[k], -grasp::reach_along(body, -Vec3::Unit(k)));
+    }
+  };
+  along_way(arm, from, way, [&](std::size_t move, const ArmBodies& at) {
+    const auto links = moving(arm, at.links);
+    rooms[move].resize(links.size() + at.carried.size());
+    for (std::size_t k = 0; k < links.size(); ++k) widen(rooms[move][k], links[k]);
+    for (std::size_t k = 0; k < at.carried.size(); ++k) widen(rooms[move][links.size() + k], at.carried[k]);
+    return true;
+  });
+  std::vector<grasp::Convex> boxes;
+  for (const std::vector<Room>& move : rooms)
+    for (const Room& room : move) {
+      Pose middle = Pose::Identity();
+      middle.translation() = (room.min + room.max) / 2;
+      boxes.push_back(grasp::make_box(middle, room.max - room.min));
+    }
+  return boxes;
 }
 
 std::vector<grasp::Convex> bodies_of(const CellBin& bin) {

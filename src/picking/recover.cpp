@@ -3,7 +3,6 @@
 #include "tribin/core/error.hpp"
 
 namespace tribin::picking {
-namespace {
 
 std::string what_was_ordered(const Entry& entry) {
   switch (entry.event) {
@@ -15,8 +14,6 @@ std::string what_was_ordered(const Entry& entry) {
       return "a move";
   }
 }
-
-}  // namespace
 
 Phase Run::in_doubt(const std::string& what) {
   const Entry& open = now().open ? *now().open : *now().in_hand;
@@ -34,11 +31,15 @@ void Run::take_answer() {
   journal_.write(said);
 }
 
-bool Run::settle_open_order() {
-  const Entry open = *now().open;
-  const robot::HandshakeOptions& shake = options_.handshake;
-  robot::Controller& controller = *links_.controller;
-  robot::Clock& clock = *links_.clock;
+bool settle(const RunLinks& links, const robot::HandshakeOptions& shake, int arm) {
+  const HandState hand = links.journal->state().hand(arm);
+  const Entry open = *hand.open;
+  robot::Controller& controller = *links.controller;
+  robot::Clock& clock = *links.clock;
+  const auto note_end = [&](robot::CycleResult result) {
+    links.journal->write(end_of(open, result));
+    must_be_no_fault(open, result);
+  };
   // What was under way to the controller when the program ended has come by then.
   clock.sleep_s(shake.settle_s);
   robot::CycleRecord record = read_record(controller, clock, open.cycle, shake);
@@ -51,21 +52,20 @@ bool Run::settle_open_order() {
   if (record.state == robot::CycleState::never_taken) {
     // That is believed where the controller still knows the cycle before, and no command waits in it.
     const bool waits = controller.read_byte(shake.variables.bytes) != 0;
-    const bool knows =
-        now().last_taken == 0 || controller.read_integer(shake.variables.integers + 1) == now().last_taken;
+    const bool knows = hand.last_taken == 0 || controller.read_integer(shake.variables.integers + 1) == hand.last_taken;
     if (waits || !knows) return false;
     Entry entry = open;
     entry.event = Event::not_taken;
-    journal_.write(entry);
+    links.journal->write(entry);
     return true;
   }
   if (record.state == robot::CycleState::under_way) {
     const robot::ControllerStatus status = controller.status();
     if (!status.ready() || !status.running) return false;
-    note_end(open, finish_cycle(controller, clock, open.cycle, shake));
+    note_end(finish_cycle(controller, clock, open.cycle, shake));
     return true;
   }
-  note_end(open, *record.result);
+  note_end(*record.result);
   return true;
 }
 
@@ -73,7 +73,7 @@ Phase Run::recover() {
   if (options_.answer) take_answer();
   if (now().open) {
     const Entry open = *now().open;
-    if (!settle_open_order())
+    if (!settle(links_, options_.handshake, open.arm))
       return in_doubt(what_was_ordered(open) + " (cycle " + std::to_string(open.cycle) +
                       ") was ordered, and the controller does not tell how it ended");
   }

@@ -15,6 +15,7 @@ std::string line_of(const CycleReport& report) {
   json["state"] = report.state;
   json["scene"] = report.scene;
   if (report.cycle) json["cycle"] = report.cycle;
+  if (report.arm) json["arm"] = report.arm;
   if (!report.part.empty()) {
     json["part"] = report.part;
     json["gripper"] = report.gripper;

@@ -11,6 +11,23 @@ inline constexpr Chooser::Where kAllPlaces[] = {Chooser::Where::slots, Chooser::
 std::string text_of(const std::vector<std::string>& texts);
 std::string text_of(const std::vector<grasp::WhyCount>& reasons);
 
+/// How an order ended, for the journal.
+Entry end_of(const Entry& order, robot::CycleResult result);
+/// \throws Error device for a fault of the robot's job
+void must_be_no_fault(const Entry& order, robot::CycleResult result);
+/// The command of an entry. Places of two arms are in the base's frame, since their robot's turns with the waist.
+robot::CycleOrder order_of(const Entry& entry, robot::CycleCommand command, const Chooser& chooser,
+                           const robot::Arm& arm, const std::vector<Stop>& stops, const std::string& gripper);
+/// The journal's entry of a pick.
+Entry pick_of(const Choice& choice, int scene);
+/// Whether the controller tells how an arm's open order ended; it is in the journal then. (recover.cpp)
+bool settle(const RunLinks& links, const robot::HandshakeOptions& shake, int arm);
+/// "the pick of alternator_a": for people.
+std::string what_was_ordered(const Entry& entry);
+
+/// Two arms: one in the bin while the other is at the rack. (two_arms.cpp)
+RunEnd pick_with_two_arms(const RunLinks& links, const RunOptions& options);
+
 /// One run of the cycle, from phase to phase.
 class Run {
  public:
@@ -28,7 +45,6 @@ class Run {
   Phase push();
 
   // recover.cpp
-  bool settle_open_order();
   void take_answer();
   Phase in_doubt(const std::string& what);
 
@@ -41,7 +57,6 @@ class Run {
   FlangePose go_to_look();
   const Gripper& gripper_now() const;  ///< as the controller tells
   void lift_to_change(const std::string& gripper);
-  void note_end(const Entry& order, robot::CycleResult result);
   bool carry_out_pick(const Choice& choice, int scene, bool from_station);
   const Chooser::Start& here();
 

@@ -48,19 +48,21 @@ class CameraVision : public Vision {
 
   const Scan* last_scan() const override { return found_ ? &scan_ : nullptr; }
 
+  void plan_for(const ArmAtWork& arm) override { at_work_ = arm; }
+
   grasp::Plan plan(const grasp::PlanOptions& options, const Places& places) override {
-    grasp::Scene scene = scene_;
+    grasp::Scene scene = scene_for_arm();
     add_places(scene, places);
     return grasp::plan_grasps(scene, options);
   }
 
   grasp::PushPlan plan_pushes(const grasp::PlanOptions& options) override {
-    return grasp::plan_pushes(scene_, options);
+    return grasp::plan_pushes(scene_for_arm(), options);
   }
 
   grasp::Plan plan_standing(const std::string& part, const Pose& base_from_part, const grasp::PlanOptions& options,
                             const Places& places) override {
-    grasp::Scene scene = scene_;
+    grasp::Scene scene = scene_for_arm();
     scene.scan = nullptr;
     scene.bin.reset();  // it does not stand in the bin: the walls are in the way, and no more
     if (from_.cell->bin)
@@ -97,12 +99,6 @@ class CameraVision : public Vision {
 
   void make_scene() {
     scene_ = grasp::scene_of(*from_.cell, scan_, base_from_camera_, found_->instances, known_);
-    if (from_.robot) {
-      grasp::ArmHere arm;
-      arm.robot = from_.robot;
-      arm.arm = &arm_of(*from_.cell, *from_.robot);
-      scene_.arm = arm;
-    }
     if (!from_.cell->bin) return;
     // What lies outside of the bin is not for picking: a rim, a wall or a thing beside it.
     const CellBin& bin = *from_.cell->bin;
@@ -113,6 +109,18 @@ class CameraVision : public Vision {
           std::abs(at.x()) < bin.inner_size_mm.x() / 2 && std::abs(at.y()) < bin.inner_size_mm.y() / 2 && at.z() > 0;
       part.pick = part.pick && inside;
     }
+  }
+
+  grasp::Scene scene_for_arm() const {
+    grasp::Scene scene = scene_;
+    if (!from_.robot) return scene;
+    grasp::ArmHere arm;
+    arm.robot = from_.robot;
+    arm.arm = &arm_of(*from_.cell, *from_.robot, at_work_.robot);
+    arm.waist = at_work_.waist;
+    scene.arm = arm;
+    scene.obstacles.insert(scene.obstacles.end(), at_work_.others.begin(), at_work_.others.end());
+    return scene;
   }
 
   static void add_places(grasp::Scene& scene, const Places& places) {
@@ -130,14 +138,15 @@ class CameraVision : public Vision {
   Pose base_from_camera_ = Pose::Identity();
   std::optional<Found> found_;
   grasp::Scene scene_;
+  ArmAtWork at_work_;
 };
 
 }  // namespace
 
 std::unique_ptr<Vision> open_vision(const VisionParts& from) { return std::make_unique<CameraVision>(from); }
 
-const robot::Arm& arm_of(const WorkCell& cell, const robot::RobotModel& robot) {
-  const std::string& name = cell.robots.front().arm;
+const robot::Arm& arm_of(const WorkCell& cell, const robot::RobotModel& robot, std::size_t number) {
+  const std::string& name = cell.robots.at(number).arm;
   return name.empty() ? robot.arms.front() : robot::arm_called(robot, name);
 }
 

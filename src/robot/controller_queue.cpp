@@ -35,8 +35,8 @@ class Queue : public ControllerQueue {
   ControllerStatus status() override {
     return turn([](Controller& c) { return c.status(); });
   }
-  CartesianPosition position(int frame) override {
-    return turn([=](Controller& c) { return c.position(frame); });
+  CartesianPosition position(int frame, int arm) override {
+    return turn([=](Controller& c) { return c.position(frame, arm); });
   }
   PulsePosition pulses() override {
     return turn([](Controller& c) { return c.pulses(); });

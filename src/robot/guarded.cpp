@@ -21,7 +21,7 @@ class Guarded : public Controller {
   }
 
   ControllerStatus status() override { return inner_->status(); }
-  CartesianPosition position(int frame) override { return inner_->position(frame); }
+  CartesianPosition position(int frame, int arm) override { return inner_->position(frame, arm); }
   PulsePosition pulses() override { return inner_->pulses(); }
   ControllerAlarms alarms() override { return inner_->alarms(); }
   RunningJob running_job() override { return inner_->running_job(); }

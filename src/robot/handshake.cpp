@@ -113,9 +113,11 @@ class Shake {
   void prepare(const CycleOrder& order) {
     if (order.cycle < 1 || order.cycle > 32767)
       throw ControllerError(ControllerFault::not_sent, "a cycle number is 1 to 32767");
-    const bool way = order.command == CycleCommand::way_points;
-    if (way ? order.positions.empty() || order.positions.size() > 6 : order.positions.size() != 3)
-      throw ControllerError(ControllerFault::not_sent, way ? "wanted 1 to 6 way points" : "wanted 3 positions");
+    const bool way = order.command == CycleCommand::way_points, waist = order.command == CycleCommand::turn_waist;
+    if (way ? order.positions.empty() || order.positions.size() > 6 : order.positions.size() != (waist ? 0u : 3u))
+      throw ControllerError(ControllerFault::not_sent, way     ? "wanted 1 to 6 way points"
+                                                       : waist ? "wanted no positions"
+                                                               : "wanted 3 positions");
     check(read([&] { return controller_.status(); }));
     const CycleRecord before = record(order.cycle);
     if (before.state != CycleState::never_taken)
@@ -128,6 +130,7 @@ class Shake {
     write_byte(at_.part_class, order.part_class);
     write_byte(at_.count, way ? static_cast<int>(order.positions.size()) : 0);
     write_integer(at_.opening, static_cast<int>(std::lround(order.opening_mm * 10)));
+    if (waist) write_integer(kWaistWanted, static_cast<int>(std::lround(order.waist_rad / kDegree * 10)));
     write_integer(at_.cycle, order.cycle);
     write_byte(at_.status, 0);
     write_byte(at_.result, 0);
@@ -155,15 +158,20 @@ class Shake {
     }
   }
 
+  std::optional<CycleResult> look(int cycle) {
+    const CycleRecord now = record(cycle);
+    if (now.state == CycleState::done) return *now.result;
+    if (now.state == CycleState::never_taken)
+      throw ControllerError(ControllerFault::unknown_outcome,
+                            "the job took cycle " + std::to_string(cycle) + " and forgot it");
+    check(read([&] { return controller_.status(); }));
+    return {};
+  }
+
   CycleResult finish(int cycle) {
     const double until = clock_.now_s() + options_.finish_s;
     while (true) {
-      const CycleRecord now = record(cycle);
-      if (now.state == CycleState::done) return *now.result;
-      if (now.state == CycleState::never_taken)
-        throw ControllerError(ControllerFault::unknown_outcome,
-                              "the job took cycle " + std::to_string(cycle) + " and forgot it");
-      check(read([&] { return controller_.status(); }));
+      if (const auto result = look(cycle)) return *result;
       if (clock_.now_s() > until) throw ControllerError(ControllerFault::unknown_outcome, "the cycle does not end");
       clock_.sleep_s(options_.poll_s);
     }
@@ -201,6 +209,29 @@ CycleResult run_cycle(Controller& controller, Clock& clock, const CycleOrder& or
   shake.prepare(order);
   shake.give(order);
   return shake.finish(order.cycle);
+}
+
+void begin_cycle(Controller& controller, Clock& clock, const CycleOrder& order, const HandshakeOptions& options) {
+  Shake shake(controller, clock, options);
+  shake.prepare(order);
+  shake.give(order);
+}
+
+std::optional<CycleResult> look_at_cycle(Controller& controller, Clock& clock, int cycle,
+                                         const HandshakeOptions& options) {
+  return Shake(controller, clock, options).look(cycle);
+}
+
+int holder_of(Controller& controller, Clock& clock, Zone zone, const HandshakeOptions& options) {
+  return Shake(controller, clock, options).read([&] { return controller.read_byte(static_cast<int>(zone)); });
+}
+
+void hand_zone(Controller& controller, Clock& clock, Zone zone, int arm, const HandshakeOptions& options) {
+  const int holder = holder_of(controller, clock, zone, options);
+  if (arm != 0 && holder != 0 && holder != arm)
+    throw ControllerError(ControllerFault::not_sent, std::string(zone == Zone::bin ? "the bin" : "the rack") +
+                                                         " belongs to arm " + std::to_string(holder));
+  Shake(controller, clock, options).write_byte(static_cast<int>(zone), arm);
 }
 
 CycleResult finish_cycle(Controller& controller, Clock& clock, int cycle, const HandshakeOptions& options) {

@@ -39,10 +39,10 @@ class HsesClient : public Controller {
     const std::string data = read(0x72, 1, 0, 8);
     return status_from_bytes(static_cast<unsigned>(get32(data, 0)) & 255, static_cast<unsigned>(get32(data, 1)) & 255);
   }
-  CartesianPosition position(int frame) override {
+  CartesianPosition position(int frame, int arm) override {
     if (frame != 1)
       throw ControllerError(ControllerFault::not_sent, "only frame 1 (robot) can be read over this protocol");
-    const auto position = position_of(read(0x75, 101, 0, 52));
+    const auto position = position_of(read(0x75, 100 + arm, 0, 52));
     if (!position || position->index() != 0) bad("position");
     return std::get<CartesianPosition>(*position);
   }

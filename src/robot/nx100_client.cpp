@@ -15,7 +15,12 @@ class Nx100Client : public Controller {
   ~Nx100Client() override { drop(); }
 
   ControllerStatus status() override { return read("RSTATS", "", status_of); }
-  CartesianPosition position(int frame) override {
+  CartesianPosition position(int frame, int arm) override {
+    if (arm != group_) {  // a choice of the controller's, which stays; it is made anew where it may not have come
+      group_ = 0;
+      command("CGROUP", std::to_string(1 << (arm - 1)) + ",0");
+      group_ = arm;
+    }
     return read("RPOSC", std::to_string(frame) + ",0",
                 [frame](std::string_view line) { return position_of(line, frame); });
   }
@@ -211,6 +216,7 @@ class Nx100Client : public Controller {
       fail(ControllerFault::unknown_outcome, std::string(name) + ": saw '" + answer.substr(0, 80) + "', wanted 0000");
   }
 
+  int group_ = 1;  ///< arm that positions are asked of; 0 = not known
   std::unique_ptr<ByteStream> stream_;
   Clock& clock_;
   Nx100Options options_;

@@ -21,11 +21,13 @@ class CellWorld {
   CellWorld(const WorkCell& cell, const robot::RobotModel& robot, const CellStock& stock,
             const SimulatedCellOptions& options);
 
-  /// The arm has come here, at this time. Steps the physics up to it.
+  /// The arms have come here, at this time. Steps the physics up to it.
   void follow(const controller_sim::Machine& machine);
-  /// The gripper closes, or its vacuum is switched on. \return whether it holds something
-  bool close(const controller_sim::Machine& machine);
-  void open(const controller_sim::Machine& machine);
+  /// The gripper of an arm (from 1) closes, or its vacuum is switched on. \return whether it holds something
+  bool close(const controller_sim::Machine& machine, int arm = 1);
+  void open(const controller_sim::Machine& machine, int arm = 1);
+  /// How far the waist turned since it was asked last: base_now_from_base_before of what it carries.
+  std::optional<Pose> waist_turn(const controller_sim::Machine& machine);
   /// Nothing in the heap moves.
   bool at_rest() const { return heap_->at_rest(); }
   bool reachable(const Pose& base_from_tcp, int tool) const;
@@ -50,22 +52,38 @@ class CellWorld {
     double opening_mm = 0;
   };
 
+  /// An arm in motion.
+  struct MovingArm {
+    int number = 1;
+    const robot::Arm* arm = nullptr;
+    Pose base_from_tcp = Pose::Identity();
+    std::optional<robot::Joints> joints;
+    int held = -1;
+    Pose tcp_from_held = Pose::Identity();
+    int tool = -1, cycle = 0;
+    Vec3 looked_at = Vec3::Constant(1e9), arm_looked_at = Vec3::Constant(1e9);
+  };
+
   void drop_parts(const SimulatedCellOptions& options);
   Pose upright_at_wall(const Solid& solid, int number, double above_mm);
   void add_tools(const WorkCell& cell);
-  Pose true_tcp(const controller_sim::Machine& machine) const;
-  void set_opening(Tool& tool, const controller_sim::Machine& machine);
-  Tool& tool_of(const controller_sim::Machine& machine);
-  void place_bodies(Tool& tool);
-  void find_contacts(const Tool& tool, const controller_sim::Machine& machine);
-  void find_arm_contacts(int tool, const controller_sim::Machine& machine);
-  void note(const std::string& what, double depth_mm, const controller_sim::Machine& machine);
+  Pose true_tcp(const controller_sim::Machine& machine, int arm) const;
+  void set_opening(Tool& tool, const controller_sim::Machine& machine, int arm);
+  Tool& tool_of(MovingArm& arm, const controller_sim::Machine& machine);
+  void take_command(MovingArm& arm, const controller_sim::Machine& machine);
+  void place_bodies(const MovingArm& arm);
+  void step_physics(double until_s);
+  void find_contacts(const MovingArm& arm, const controller_sim::Machine& machine);
+  void find_arm_contacts(MovingArm& arm, const controller_sim::Machine& machine);
+  void find_contacts_of_arms(const controller_sim::Machine& machine);
+  std::vector<grasp::Convex> bodies_of_arm(const MovingArm& arm) const;
+  bool is_held(int part) const;
+  void note(const std::string& what, double depth_mm, const controller_sim::Machine& machine, int arm);
   void note_placed(int part, int slot, const Pose& base_from_wanted);
-  bool in_push(const controller_sim::Machine& machine) const;
+  bool in_push(const controller_sim::Machine& machine, int arm) const;
 
   const WorkCell& cell_;
   const robot::RobotModel& robot_;
-  const robot::Arm& arm_;
   const CellStock& stock_;
   SimulatedCellOptions options_;
   Random random_;
@@ -76,13 +94,8 @@ class CellWorld {
   std::vector<int> class_of_;
   std::unique_ptr<LiveHeap> heap_;
   std::vector<Tool> tools_;
-  Pose base_from_tcp_ = Pose::Identity();
-  std::optional<robot::Joints> joints_;
-  int held_ = -1;
-  Pose tcp_from_held_ = Pose::Identity();
-  int active_ = -1, cycle_ = 0;
-  double physics_s_ = 0;
-  Vec3 looked_at_ = Vec3::Constant(1e9), arm_looked_at_ = Vec3::Constant(1e9);
+  std::vector<MovingArm> arms_;
+  double waist_ = 0, physics_s_ = 0;
   std::set<std::pair<int, std::string>> noted_;
   std::vector<Pose> at_scan_;
   CellTruth truth_;

@@ -29,6 +29,12 @@ class CellClock : public controller_sim::VirtualClock {
       machine_.advance(now_s());
       if (now_s() - seen_s_ < kTick_s) continue;
       seen_s_ = now_s();
+      if (const std::optional<Pose> turn = world_.waist_turn(machine_)) {  // it carries both arms
+        for (int arm = 1; arm <= machine_.arms(); ++arm) {
+          robot::CartesianPosition at = machine_.position(arm);
+          machine_.place(robot::position_from_pose(*turn * robot::pose_of(at), at.type, at.tool, at.frame), arm);
+        }
+      }
       world_.follow(machine_);
     }
   }
@@ -42,13 +48,9 @@ class CellClock : public controller_sim::VirtualClock {
 controller_sim::MachineOptions options_of(CellWorld& world) {
   controller_sim::MachineOptions options;
   options.on_output = [&world](controller_sim::Machine& machine, int output, bool on) {
-    if (output != 1) return;
-    if (on) {
-      machine.set_input(1, world.close(machine));
-    } else {
-      world.open(machine);
-      machine.set_input(1, false);
-    }
+    if (output < 1 || output > machine.arms()) return;  // of arm n: output and input n
+    if (!on) world.open(machine, output);
+    machine.set_input(output, on && world.close(machine, output));
   };
   return options;
 }
@@ -63,6 +65,10 @@ void check(const WorkCell& cell) {
   want(!cell.grippers.empty(), "no [[gripper]]", "one at least");
   want(!cell.robots.empty(), "no [[robot]]", "one");
   want(cell.mount() == CameraMount::fixed || !cell.camera->looks.empty(), "no camera.looks", "one at least");
+  want(cell.robots.size() <= 2, "more than two robots", "two arms at most");
+  for (const CellRobot& robot : cell.robots)
+    want(cell.robots.size() == 1 || (robot.wait && !robot.grippers.empty()), "two robots without wait and grippers",
+         "both of each");
   want(cell.robots.front().controller.kind != ControllerKind::text, "a robot that is a client", "nx100 or hses");
 }
 
@@ -101,8 +107,29 @@ struct SimulatedCell::State : Camera {
       machine.place(robot::position_from_pose(tcp, 0, 1));
       world.follow(machine);
     }
+    if (cell.robots.size() > 1) {
+      start_two_arms();
+      return;
+    }
     machine.add_job(controller_sim::parse_job(controller_sim::handshake_job(), "BPICK"));
     machine.start("BPICK");
+  }
+
+  /// Each stands where it waits, with the first of its grippers.
+  void start_two_arms() {
+    for (int arm = 1; arm <= 2; ++arm) {
+      const CellRobot& robot = cell.robots[static_cast<std::size_t>(arm) - 1];
+      const auto is_first = [&](const Gripper& g) { return g.name == robot.grippers.front(); };
+      const auto gripper = std::find_if(cell.grippers.begin(), cell.grippers.end(), is_first);
+      machine.place(robot::position_from_pose(*robot.wait * gripper->flange_from_tcp, 0,
+                                              static_cast<int>(gripper - cell.grippers.begin()) + 1, 0),
+                    arm);
+      machine.add_job(controller_sim::parse_job(controller_sim::handshake_job_of_arm(arm), "BPICK"));
+    }
+    machine.add_job(controller_sim::parse_job(controller_sim::waist_job(), "TWAIST"));
+    machine.start("BPICK1");
+    machine.run_beside("BPICK2");
+    world.follow(machine);
   }
 
   std::string name() const override { return "sim"; }

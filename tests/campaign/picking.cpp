@@ -1,5 +1,5 @@
 // Simulated cells from full bin to full rack: what is placed, how, and what is left.
-// usage: campaign_picking [BINS] [SEED] [--workcell FILE] [--parts N] [--at-walls] [-v]
+// usage: campaign_picking [BINS] [SEED] [--workcell FILE] [--parts N] [--at-walls] [--one-arm] [-v]
 #include <unistd.h>
 
 #include <algorithm>
@@ -25,6 +25,7 @@ struct Totals {
       pushes = 0;
   int collisions = 0, wrong = 0, twice = 0, disturbed = 0;
   std::map<std::string, int> ends, refused, left, grip_failures, touched;
+  double robot_s = 0;
   std::vector<double> off_mm, off_deg, find_ms, plan_ms, cycle_s;
 };
 
@@ -101,7 +102,7 @@ void print(const char* name, const std::map<std::string, int>& counts) {
 int main(int argc, char** argv) try {
   int bins = 50, parts_in_bin = 15, numbers = 0;
   std::uint64_t seed = 1;
-  bool verbose = false, at_walls = false;
+  bool verbose = false, at_walls = false, one_arm = false;
   std::string file = std::string(TRIBIN_SOURCE_DIR) + "/examples/cells/pick_cell.toml";
   for (int i = 1; i < argc; ++i)
     if (std::strcmp(argv[i], "--workcell") == 0 && i + 1 < argc)
@@ -110,13 +111,16 @@ int main(int argc, char** argv) try {
       parts_in_bin = std::atoi(argv[++i]);
     else if (std::strcmp(argv[i], "--at-walls") == 0)
       at_walls = true;
+    else if (std::strcmp(argv[i], "--one-arm") == 0)  // of two
+      one_arm = true;
     else if (std::strcmp(argv[i], "-v") == 0)
       verbose = true;
     else if (numbers++ == 0)
       bins = std::atoi(argv[i]);
     else
       seed = std::strtoull(argv[i], nullptr, 10);
-  const WorkCell cell = read_work_cell(file);
+  WorkCell cell = read_work_cell(file);
+  if (one_arm) cell.robots.resize(1);
   const robot::RobotModel robot = read_robot(cell.robots.at(0).model);
   std::vector<Part> parts;
   std::vector<Mesh> meshes;
@@ -182,6 +186,7 @@ int main(int argc, char** argv) try {
     ++totals.ends[end.status];
     totals.placed_without_help += without_help;
     totals.picks += truth.grips;
+    totals.robot_s += truth.simulated_s;
     judge(cell, truth, journal.state().filling, totals);
     if (verbose && end.status == "not_pickable") {  // what is left, and why no gripper takes it
       picking::Places anywhere;
@@ -236,6 +241,7 @@ int main(int argc, char** argv) try {
   std::printf("vision: find median %.0f ms, 95 %% %.0f ms; grasps median %.0f ms, 95 %% %.0f ms (this machine)\n",
               quantile(totals.find_ms, 0.5), quantile(totals.find_ms, 0.95), quantile(totals.plan_ms, 0.5),
               quantile(totals.plan_ms, 0.95));
+  std::printf("robot: %.1f s a placed part\n", totals.robot_s / std::max(1, totals.placed));
   std::printf("cycle: median %.1f s, 95 %% %.1f s\n", quantile(totals.cycle_s, 0.5), quantile(totals.cycle_s, 0.95));
   print("ends", totals.ends);
   print("left", totals.left);

@@ -162,11 +162,122 @@ TEST(HandshakeOfArm2, UsesVariablesOfItsOwn) {
   robot::HandshakeOptions options;
   options.variables = {10, 10, 20};
   std::mt19937_64 random(1);
+  for (const robot::Zone zone : {robot::Zone::bin, robot::Zone::rack}) hand_zone(*client, clock, zone, 2);
   for (int cycle = 1; cycle <= 4; ++cycle)
     EXPECT_EQ(run_cycle(*client, clock, test::random_order(cycle, random), options), CycleResult::done);
   EXPECT_EQ(machine.integers[12], 4);
   EXPECT_EQ(machine.integers[2], 0);
   EXPECT_EQ(machine.moves().front().index, 21);
+}
+
+/// A controller with both arms' jobs, whose grips hold.
+struct TwoArmedCell {
+  TwoArmedCell() {
+    for (const int arm : {1, 2}) machine.add_job(parse_job(handshake_job_of_arm(arm), "BPICK"));
+    machine.add_job(parse_job(waist_job(), "TWAIST"));
+    machine.start("BPICK1");
+    machine.run_beside("BPICK2");
+    options[1].variables = {10, 10, 20};
+  }
+  Machine machine{[] {
+    MachineOptions behaviour;
+    behaviour.on_output = [](Machine& m, int output, bool on) { m.set_input(output, on); };
+    return behaviour;
+  }()};
+  Wire wire{machine, {}};
+  VirtualClock clock;
+  std::unique_ptr<robot::Controller> client = robot::make_nx100(virtual_stream(wire, clock), clock);
+  robot::HandshakeOptions options[2];
+};
+
+TEST(TwoArmedHandshake, NoJobGoesWhereAnotherArmIs) {
+  TwoArmedCell cell;
+  std::mt19937_64 random(1);
+  robot::CycleOrder order = test::random_order(1, random);
+  order.command = robot::CycleCommand::pick;
+  EXPECT_EQ(run_cycle(*cell.client, cell.clock, order, cell.options[0]), CycleResult::fault);  // nobody's
+  hand_zone(*cell.client, cell.clock, robot::Zone::bin, 2);
+  EXPECT_THROW(hand_zone(*cell.client, cell.clock, robot::Zone::bin, 1), ControllerError);
+  order.cycle = 2;
+  EXPECT_EQ(run_cycle(*cell.client, cell.clock, order, cell.options[0]), CycleResult::fault);
+  EXPECT_TRUE(cell.machine.moves().empty());
+  hand_zone(*cell.client, cell.clock, robot::Zone::bin, 0);
+  hand_zone(*cell.client, cell.clock, robot::Zone::bin, 1);
+  order.cycle = 3;
+  EXPECT_EQ(run_cycle(*cell.client, cell.clock, order, cell.options[0]), CycleResult::done);
+}
+
+TEST(TwoArmedHandshake, ArmsMoveAtTheSameTime) {
+  TwoArmedCell cell;
+  std::mt19937_64 random(1);
+  hand_zone(*cell.client, cell.clock, robot::Zone::bin, 1);
+  hand_zone(*cell.client, cell.clock, robot::Zone::rack, 2);
+  robot::CycleOrder pick = test::random_order(1, random), place = test::random_order(1, random);
+  pick.command = robot::CycleCommand::pick, place.command = robot::CycleCommand::place;
+  cell.machine.set_input(2, true);  // it holds a part
+  begin_cycle(*cell.client, cell.clock, pick, cell.options[0]);
+  begin_cycle(*cell.client, cell.clock, place, cell.options[1]);
+  const double begun = cell.clock.now_s();
+  double over[2] = {0, 0};
+  while (over[0] == 0 || over[1] == 0) {
+    for (const int arm : {0, 1})
+      if (over[arm] == 0 && look_at_cycle(*cell.client, cell.clock, 1, cell.options[arm]))
+        over[arm] = cell.clock.now_s();
+    cell.clock.sleep_s(0.05);
+  }
+  const auto of_arm = [&](int arm) {
+    std::vector<double> begins;
+    for (const MoveRecord& move : cell.machine.moves())
+      if (move.arm == arm) begins.push_back(move.time_s);
+    return begins;
+  };
+  ASSERT_EQ(of_arm(1).size(), 3u);
+  ASSERT_EQ(of_arm(2).size(), 3u);
+  EXPECT_LT(of_arm(2).front(), of_arm(1).back());
+  EXPECT_LT(of_arm(1).front(), of_arm(2).back());
+  EXPECT_GT(over[0] - begun, 0);
+  // Each is where it was sent; the controller tells of both.
+  EXPECT_NEAR(cell.client->position(1, 1).numbers[0], pick.positions.back().numbers[0], 0.01);
+  EXPECT_NEAR(cell.client->position(1, 2).numbers[0], place.positions.back().numbers[0], 0.01);
+  EXPECT_NEAR(cell.client->position(1, 1).numbers[0], pick.positions.back().numbers[0], 0.01);
+}
+
+TEST(TwoArmedHandshake, AHoldStopsBothAndBothGoOn) {
+  TwoArmedCell cell;
+  std::mt19937_64 random(2);
+  hand_zone(*cell.client, cell.clock, robot::Zone::bin, 1);
+  hand_zone(*cell.client, cell.clock, robot::Zone::rack, 2);
+  robot::CycleOrder pick = test::random_order(1, random), place = test::random_order(1, random);
+  pick.command = robot::CycleCommand::pick, place.command = robot::CycleCommand::place;
+  cell.machine.set_input(2, true);
+  begin_cycle(*cell.client, cell.clock, pick, cell.options[0]);
+  begin_cycle(*cell.client, cell.clock, place, cell.options[1]);
+  cell.machine.hold(true);
+  const auto first = cell.machine.position(1).numbers, second = cell.machine.position(2).numbers;
+  cell.machine.advance(cell.clock.now_s() + 5);
+  EXPECT_EQ(cell.machine.position(1).numbers, first);
+  EXPECT_EQ(cell.machine.position(2).numbers, second);
+  cell.machine.hold(false);
+  ASSERT_EQ(cell.machine.start(""), 0);
+  EXPECT_EQ(finish_cycle(*cell.client, cell.clock, 1, cell.options[0]), CycleResult::done);
+  EXPECT_EQ(finish_cycle(*cell.client, cell.clock, 1, cell.options[1]), CycleResult::done);
+  EXPECT_EQ(cell.machine.moves().size(), 6u);  // what was stopped is no second move
+}
+
+TEST(TwoArmedHandshake, TheWaistTurnsForItsOwnerAndWhileNobodyIsAtWorkAlone) {
+  TwoArmedCell cell;
+  robot::CycleOrder order;
+  order.command = robot::CycleCommand::turn_waist;
+  order.waist_rad = -35 * kDegree;
+  EXPECT_EQ(run_cycle(*cell.client, cell.clock, order, cell.options[0]), CycleResult::done);
+  EXPECT_EQ(cell.machine.integers[robot::kWaistIs], -350);
+  hand_zone(*cell.client, cell.clock, robot::Zone::rack, 2);
+  order.cycle = 2, order.waist_rad = 0;
+  EXPECT_EQ(run_cycle(*cell.client, cell.clock, order, cell.options[0]), CycleResult::fault);
+  EXPECT_EQ(cell.machine.integers[robot::kWaistIs], -350);
+  robot::HandshakeOptions impatient = cell.options[1];
+  impatient.take_s = 1;
+  EXPECT_THROW(run_cycle(*cell.client, cell.clock, order, impatient), ControllerError);  // arm 2 has no such command
 }
 
 TEST(HandshakeBehindTheGate, RunsWithConsentAndNotOutsideTheWorkspace) {

@@ -196,6 +196,16 @@ TEST(BpickJob, IsTheSampleProgram) {
             static_cast<std::size_t>(std::count(sample.begin(), sample.end(), '\n')));
 }
 
+TEST(BpickJob, OfTwoArmsAreTheSamplePrograms) {
+  for (const int arm : {1, 2}) {
+    std::ifstream file(std::string(TRIBIN_SOURCE_DIR) + "/examples/robots/BPICK" + std::to_string(arm) + ".JBI",
+                       std::ios::binary);
+    std::string sample(std::istreambuf_iterator<char>(file), {});
+    std::erase(sample, '\r');
+    EXPECT_EQ(sample, handshake_job_of_arm(arm));
+  }
+}
+
 std::unique_ptr<Controller> client_of(const std::string& protocol, Wire& wire, VirtualClock& clock) {
   if (protocol == "nx100") return robot::make_nx100(virtual_stream(wire, clock), clock);
   return robot::make_hses(virtual_datagrams(wire, clock), clock, {}, {}, virtual_datagrams(wire, clock, true));

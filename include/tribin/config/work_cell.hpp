@@ -125,8 +125,10 @@ struct CellController {
 };
 
 struct CellRobot {
-  std::filesystem::path model;  ///< geometry file of the arm
-  std::string arm;              ///< of the model; empty = its first
+  std::filesystem::path model;        ///< geometry file of the arm
+  std::string arm;                    ///< of the model; empty = its first
+  std::vector<std::string> grippers;  ///< that sit on it; empty = all
+  std::optional<Pose> wait;           ///< base_from_flange where one of two arms waits, for a waist at 0
   CellController controller;
   double speed_cap_mm_s = 250;
   double sigma_mm = 0.3;         ///< sd of where it stands when it is sent somewhere

@@ -83,5 +83,10 @@ Job parse_job(std::string_view text, const std::string& where);
 
 /// The hand-shake job BPICK of docs/robot.md: examples/robots/BPICK.JBI as it is.
 std::string handshake_job();
+/// The jobs of two arms, BPICK1 and BPICK2: they go into bin and rack by the tokens B020 and B021 alone, and the first
+/// turns the waist. \param arm  1 or 2
+std::string handshake_job_of_arm(int arm);
+/// TWAIST, which an integrator writes: I005 is the waist's angle then [0.1 deg].
+std::string waist_job();
 
 }  // namespace tribin::controller_sim

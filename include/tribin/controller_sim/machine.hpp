@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <deque>
 #include <functional>
 #include <map>
@@ -28,7 +29,8 @@ struct MoveRecord {
   double time_s = 0;
   char position = 0;  ///< 'C', 'P' of a job; 'H' a move by host command
   int index = 0;      ///< of the position
-  int cycle = 0;      ///< I000 when the job took its command (I001)
+  int cycle = 0;      ///< of the arm's hand-shake when the job took its command: I001, I011
+  int arm = 1;        ///< that moved
 };
 
 /// Not safe for several threads: who serves it keeps them apart.
@@ -41,6 +43,9 @@ class Machine {
   double now_s() const { return now_; }
 
   void add_job(Job job);
+  /// A job for the second arm (///GROUP2): it runs beside the other from now on, whenever that runs. What it says is
+  /// told of arm 2. \throws Error bad_input where there is no such job
+  void run_beside(const std::string& job);
   bool has_job(const std::string& name) const { return jobs_.count(name) > 0; }
   std::vector<std::string> job_names() const;
   /// Message number, 0 = done.
@@ -48,8 +53,9 @@ class Machine {
 
   robot::ControllerStatus status() const;
   /// Where the arm stands before anything has moved it.
-  void place(const robot::CartesianPosition& at) { at_ = at; }
-  robot::CartesianPosition position() const;                   ///< on the way while it moves
+  void place(const robot::CartesianPosition& at, int arm = 1) { tasks_[arm - 1].standing = at; }
+  robot::CartesianPosition position(int arm = 1) const;  ///< on the way while it moves
+  int arms() const { return tasks_[1].stack.empty() ? 1 : 2; }
   const std::vector<long>& pulses() const { return pulses_; }  ///< the last ones that it was sent to
   robot::RunningJob running_job() const;
 
@@ -103,8 +109,22 @@ class Machine {
     std::size_t at = 0;
   };
 
+  /// What one arm does: the job that runs or was stopped, and its motion.
+  struct Task {
+    std::vector<Frame> stack;  ///< callers below
+    double busy_until = 0;     ///< of a timer or an instruction
+    double wait_until = -1;    ///< of WAIT IN#; < 0: it waits for none, or has just begun
+    bool moving = false;
+    bool interrupted = false;  ///< a move was stopped and goes on when the job does
+    Motion motion;
+    robot::CartesianPosition standing;  ///< where the arm is when it does not move
+  };
+
+  Task& task() { return tasks_[task_]; }
+  const Task& task() const { return tasks_[task_]; }
+  bool take_next_task(double& due_s);
   int begin_motion(const robot::CartesianPosition& to, double speed_mm_s, double turn_deg_s);
-  Pose pose_at(double time_s) const;
+  static Pose pose_at(const Motion& motion, double time_s);
   void stop();
   void step_job();
   void execute(const Instruction& instruction);
@@ -122,15 +142,10 @@ class Machine {
   bool held_pendant_ = false, held_external_ = false, held_command_ = false;
   bool running_ = false;
   std::map<std::string, Job> jobs_;
-  std::vector<Frame> stack_;  ///< the job that runs or was stopped, callers below
-  double busy_until_ = 0;     ///< of a timer or an instruction
-  double wait_until_ = -1;    ///< of WAIT IN#; < 0: it waits for none, or has just begun
-  bool moving_ = false;
+  std::array<Task, 2> tasks_;  ///< the master's, and one beside it
+  std::size_t task_ = 0;       ///< that is at work; the host's commands are to the master
   bool host_move_ = false;
-  bool interrupted_ = false;  ///< a move of the job was stopped and goes on when the job does
   std::vector<long> pulses_ = std::vector<long>(12, 0);
-  Motion motion_;
-  robot::CartesianPosition at_;  ///< where it stands when it does not move
   std::map<int, bool> inputs_, outputs_;
   std::deque<MoveRecord> moves_;
 };

@@ -25,6 +25,7 @@ struct Wire {
   bool unknown_is_ng = true;  ///< an unknown command: NG, or OK and ERROR 1010
   int angle_decimals = 2;     ///< of positions in answers
   int commands = 0;           ///< taken so far
+  int arm = 1;                ///< that CGROUP chose
 };
 
 /// One connection of host control. Bounded whatever comes: lines and sizes beyond 1 KiB end it.

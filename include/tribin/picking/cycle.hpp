@@ -34,6 +34,7 @@ std::string_view name_of(Resort resort);
 struct CycleReport {
   std::string state;  ///< placed, put_down, missed, lost, pushed, no_pick
   int cycle = 0, scene = 0;
+  int arm = 0;  ///< of two; 0 = there is one
   std::string part, gripper, grasp;
   int slot = 0;
   Resort resort = Resort::none;

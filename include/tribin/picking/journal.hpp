@@ -32,6 +32,7 @@ std::string_view name_of(Event event);
 struct Entry {
   Event event = Event::new_rack;
   int cycle = 0;  ///< number of the hand-shake; 0 = none
+  int arm = 1;    ///< of two: each has a hand and cycles of its own
   int scene = 0;  ///< that the part was found in
   std::string part, gripper, grasp;
   int slot = 0;                            ///< of places: 0 = the station for gripping anew
@@ -42,15 +43,23 @@ struct Entry {
   std::string note;                        ///< for people
 };
 
-/// What the journal says about now.
-struct JournalState {
-  Filling filling;
-  std::optional<Entry> in_hand;     ///< the entry that tells of it
-  std::optional<Entry> at_station;  ///< put down to be gripped anew
-  std::optional<Entry> open;        ///< an order whose end is not known
-  int last_cycle = 0, last_scene = 0;
+/// What the journal says about one arm.
+struct HandState {
+  std::optional<Entry> in_hand;  ///< the entry that tells of it
+  std::optional<Entry> open;     ///< an order whose end is not known
+  int last_cycle = 0;
   int last_taken = 0;  ///< the last cycle that the controller is known to have had; 0 = none
+};
+
+/// What the journal says about now: of the first arm, and of the second where there is one.
+struct JournalState : HandState {
+  HandState second;
+  Filling filling;
+  std::optional<Entry> at_station;  ///< put down to be gripped anew
+  int last_scene = 0;
   int placed = 0;
+  HandState& hand(int arm) { return arm == 2 ? second : *this; }
+  const HandState& hand(int arm) const { return arm == 2 ? second : *this; }
 };
 
 /// Follows one entry. \throws Error bad_input where it cannot follow the state (a slot that the rack does not have or

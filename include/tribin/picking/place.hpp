@@ -20,7 +20,10 @@ struct ArmWithTool {
   const robot::RobotModel* robot = nullptr;
   const robot::Arm* arm = nullptr;
   Pose flange_from_tcp = Pose::Identity();
+  double waist = 0;  ///< [rad]
   std::optional<CellRange> workspace;
+  std::vector<grasp::Convex> on_tcp;  ///< gripper and what it holds, frame of the TCP: kept clear of the others
+  std::vector<grasp::Convex> others;  ///< where another arm is, or may be meanwhile
   double limit_margin_rad = 2 * kDegree;
   double singularity = 0.1;
 };
@@ -30,6 +33,9 @@ struct Stop {
   Pose base_from_tcp = Pose::Identity();
   robot::Joints joints{};
 };
+
+/// A part's box.
+grasp::Convex box_of(const Part& part, const Pose& frame_from_part);
 
 /// How to stand at each of the places, in one configuration, with no turn that is not needed. \return none where one is
 /// out of reach or of the workspace
@@ -72,9 +78,16 @@ std::optional<Placing> plan_place(const ArmWithTool& arm, const Held& held, std:
 std::vector<Pose> way_between(const Pose& from, const Pose& to, double travel_mm, std::span<const Pose> taught,
                               const Vec3& keep_still);
 
-/// Whether an arm's links keep clear of bodies on a way, taken straight in space as well as straight in the joints.
+/// Whether an arm's links keep clear of bodies on a way, taken straight in space as well as straight in the joints; and
+/// of the other arm, with all that it carries.
 bool arm_is_clear(const ArmWithTool& arm, const Stop& from, std::span<const Stop> way,
                   std::span<const grasp::Convex> bodies);
+
+/// What of an arm moves, at joint angles, with all that it carries. Base frame.
+std::vector<grasp::Convex> bodies_at(const ArmWithTool& arm, const robot::Joints& joints);
+
+/// Boxes that an arm with all it carries stays in on such a way, one a piece and move. Base frame, along its axes.
+std::vector<grasp::Convex> room_of_way(const ArmWithTool& arm, const Stop& from, std::span<const Stop> way);
 
 /// Floor and walls of a bin, base frame.
 std::vector<grasp::Convex> bodies_of(const CellBin& bin);

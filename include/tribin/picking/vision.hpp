@@ -31,9 +31,18 @@ struct Sight {
   std::vector<std::string> warnings;
 };
 
+/// For which of two arms grasps are planned.
+struct ArmAtWork {
+  std::size_t robot = 0;              ///< index into WorkCell::robots
+  double waist = 0;                   ///< [rad]
+  std::vector<grasp::Convex> others;  ///< where the other arm is, or may be meanwhile; base frame
+};
+
 class Vision {
  public:
   virtual ~Vision() = default;
+  /// Plans are for that arm from now on. Without it they are for the first.
+  virtual void plan_for(const ArmAtWork& arm) { (void)arm; }
   /// Takes a scan and finds the parts in it.
   /// \param flange  where the flange stands, asked when the scan is taken; none for a camera that is not on it
   virtual Sight scan(const FlangePose& flange) = 0;
@@ -64,8 +73,8 @@ struct VisionParts {
 /// \throws Error bad_input where a gripper cannot be used, or the cell lacks what is needed
 std::unique_ptr<Vision> open_vision(const VisionParts& from);
 
-/// The arm that a cell's robot drives. \throws Error bad_input
-const robot::Arm& arm_of(const WorkCell& cell, const robot::RobotModel& robot);
+/// The arm that an entry of `[[robot]]` drives. \throws Error bad_input
+const robot::Arm& arm_of(const WorkCell& cell, const robot::RobotModel& robot, std::size_t number = 0);
 
 /// All poses in which a part looks as it does in this one: its symmetries, turns about an axis in steps of 15 deg.
 std::vector<Pose> alike(const Part& part, const Pose& pose);
