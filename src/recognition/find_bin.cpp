@@ -235,7 +235,7 @@ Mat6 covariance_of(const BinModel& model, const SceneDepth& scene, const BinFit&
   IndexRender render;
   render_index(model.level, scene.camera, fit.camera_from_bin, step, render);
   const Mat6 pull = scale.asDiagonal() *
-                    Mat6(pull_of_systematic_errors(render, scene, scene.surfels->scan->noise, at, 0)) *
+                    Mat6(common_errors(render, scene, scene.surfels->scan->noise, at, 0).systematic) *
                     scale.asDiagonal();
   const double shape = kShapeSigma * model.longest_mm;
   const Mat6 c = held + held * pull * held / (inflation * inflation) + shape * shape * Mat6::Identity();

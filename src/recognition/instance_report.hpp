@@ -10,11 +10,13 @@ namespace tribin {
 /// unit when radians count `part.gyration_mm`.
 std::vector<Vector6> free_directions_about_center(const Part& part, const Pose& camera_from_part);
 
-/// Fills covariance, free and weak directions from the information of the final refinement.
-/// \param systematic_pull  from pull_of_systematic_errors, at the refined pose.
-/// \param patch_pull       from pull_of_patches, the same.
-void describe_uncertainty(const Part& part, const Matrix6& systematic_pull, const Matrix6& patch_pull,
-                          const Refinement& refinement, Instance& instance);
+/// Covariance by noise alone of (mm, rad about the box centre), camera axes; 0 along free directions.
+Matrix6 noise_covariance(const Part& part, const Refinement& refinement);
+
+/// Fills covariance, free and weak directions.
+/// \param common_pull  of what errors have in common (pose/systematic_error.hpp), at the refined pose.
+void describe_uncertainty(const Part& part, const Matrix6& common_pull, const Refinement& refinement,
+                          Instance& instance);
 
 /// Mean square of how far the covariance lets a point of the part (camera frame) move, over all directions [mm^2].
 double motion_variance(const Instance& instance, const Vec3& at);

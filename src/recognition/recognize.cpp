@@ -55,12 +55,16 @@ double share_of_first(const Instance& instance) {
   return share;
 }
 
-Instance make_instance(const Polished& p, std::span<const Part> parts, const SceneDepth& scene,
-                       const NoiseProfile& noise, const RecognitionOptions& recognition) {
-  const Part& part = parts[static_cast<std::size_t>(p.candidate.part)];
-  Instance out;
-  out.part = part.name;
-  // The last word: every pixel, up to 60 000 (more gain nothing against systematic terms), and every second one where
+/// The last word on a pose, and what its residuals tell of errors that pixels have in common.
+struct LastWord {
+  Refinement refined;
+  CommonErrors errors;
+  FieldVariance field;
+};
+
+LastWord last_word(const Polished& p, const Part& part, const SceneDepth& scene, const NoiseProfile& noise) {
+  LastWord out;
+  // Every pixel, up to 60 000 (more gain nothing against systematic terms), and every second one where
   // the noise is so correlated that its neighbours repeat it (neighbour correlation over 0.6).
   const int step =
       std::max(scene.correlation_px >= 0.7 ? 2 : 1, step_for(part, scene, p.candidate.camera_from_part, 60000));
@@ -68,16 +72,41 @@ Instance make_instance(const Polished& p, std::span<const Part> parts, const Sce
       refine_options(part, Detail::full, step, 3, std::max(0.002 * part.diameter_mm, 4 * scene.median_sigma_mm));
   options.outlines = options.by_patches = true;
   options.frozen = free_directions_about_center(part, p.candidate.camera_from_part);
-  Refinement refined = refine_guarded(part, Detail::full, scene, p.candidate.camera_from_part, options);
+  out.refined = refine_guarded(part, Detail::full, scene, p.candidate.camera_from_part, options);
   settle_weak_directions(part, scene, options.frozen,
-                         std::max(step, step_for(part, scene, p.candidate.camera_from_part, 10000)), refined);
-  out.camera_from_part = refined.camera_from_part;
-  const Vec3 center(out.camera_from_part * part.box_center());
+                         std::max(step, step_for(part, scene, p.candidate.camera_from_part, 10000)), out.refined);
+  const Pose& pose = out.refined.camera_from_part;
   thread_local IndexRender render;
-  render_index(part.render_mesh, scene.camera, out.camera_from_part, step, render);
-  const Matrix6 pull = pull_of_systematic_errors(render, scene, noise, center, options.cad_sigma_mm);
-  const Matrix6 patches = pull_of_patches(render, scene, center, options.cad_sigma_mm);
-  describe_uncertainty(part, pull, patches, refined, out);
+  render_index(part.render_mesh, scene.camera, pose, step, render);
+  out.errors = common_errors(render, scene, noise, pose * part.box_center(), options.cad_sigma_mm);
+  out.field = field_variance(out.errors.patches, noise_covariance(part, out.refined),
+                             6 - static_cast<int>(options.frozen.size()));
+  return out;
+}
+
+/// What patches are off by is the scene's and the sensor's as much as the part's: the mean over all that was found.
+double common_variance(std::span<const LastWord> all) {
+  double sum = 0, weight = 0;
+  for (const LastWord& w : all) {
+    sum += w.field.patches * w.field.mm2;
+    weight += w.field.patches;
+  }
+  return weight > 0 ? sum / weight : 0;
+}
+
+/// \param shared_mm2  common_variance of the scan.
+Instance make_instance(const Polished& p, const LastWord& last, double shared_mm2, std::span<const Part> parts,
+                       const RecognitionOptions& recognition) {
+  const Part& part = parts[static_cast<std::size_t>(p.candidate.part)];
+  Instance out;
+  out.part = part.name;
+  out.camera_from_part = last.refined.camera_from_part;
+  // The scan's mean counts as much as a dozen of the part's own patches, and patches of like normals share what they
+  // are off by over a fifth of the diameter (docs/recognition.md has what was measured).
+  constexpr double kPrior = 12, kCorrelation = 0.2;
+  const double variance = (last.field.patches * last.field.mm2 + kPrior * shared_mm2) / (last.field.patches + kPrior);
+  const Matrix6 field = pull_of_field(last.errors.patches, variance, kCorrelation * part.diameter_mm);
+  describe_uncertainty(part, Matrix6(field + last.errors.systematic), last.refined, out);
 
   // Self-similar poses: those that keep 1 % are told.
   double sum = 1;
@@ -186,14 +215,16 @@ Instances recognize(const Primitives& primitives, const PrimitiveModel& observat
   out.work_done = budget.done();
   decide_together(scene, parts, found);
   CellMask told;  // cells of the parts that are told of; what is kept back explains nothing
-  std::vector<Instance> made(found.size());
+  std::vector<LastWord> last(found.size());
   parallel_each(static_cast<int>(found.size()), [&](int i) {
     const auto k = static_cast<std::size_t>(i);
-    made[k] = make_instance(found[k], parts, scene, surfels.scan->noise, options);
+    const Part& part = parts[static_cast<std::size_t>(found[k].candidate.part)];
+    last[k] = last_word(found[k], part, scene, surfels.scan->noise);
   });
+  const double shared_mm2 = common_variance(last);
   for (std::size_t i = 0; i < found.size(); ++i) {
     const Polished& p = found[i];
-    Instance& instance = made[i];
+    Instance instance = make_instance(p, last[i], shared_mm2, parts, options);
     const auto kept_back = [&](const char* test, double value, double limit) {
       add_reason(out.rejected, {instance.part, "acceptance", test, value, limit, 1,
                                 place_of(parts[static_cast<std::size_t>(p.candidate.part)], p.candidate)});

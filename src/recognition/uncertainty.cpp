@@ -41,46 +41,61 @@ std::vector<Vector6> free_directions_about_center(const Part& part, const Pose& 
   return out;
 }
 
-void describe_uncertainty(const Part& part, const Matrix6& systematic_pull, const Matrix6& patch_pull,
-                          const Refinement& refinement, Instance& instance) {
+namespace {
+
+/// The information in coordinates in which radians count the lever, by its eigenvectors, the free directions first.
+struct Held {
+  Vec6 scale;
+  Vec6 sigma;       ///< along each, by noise alone [mm]; of free ones 0
+  Mat6 directions;  ///< columns
+  int free = 0;
+};
+
+Held held_directions(const Part& part, const Refinement& refinement) {
+  Held out;
+  out.scale = scale_of_motion(part.gyration_mm);
+  out.free = static_cast<int>(part.symmetry.continuous.size());
+  const Mat6 keep = off_directions(free_directions_about_center(part, refinement.camera_from_part), Vector6(out.scale));
+  // What nothing holds is known to a diameter; free directions alone have no information.
+  const Mat6 h = out.scale.asDiagonal() * Mat6(refinement.information) * out.scale.asDiagonal();
+  const Mat6 least = Mat6::Identity() / (part.diameter_mm * part.diameter_mm);
+  const Eigen::SelfAdjointEigenSolver<Mat6> eigen(Mat6(keep * (h + least) * keep));
+  out.directions = eigen.eigenvectors();
+  out.sigma.setZero();
+  for (int k = out.free; k < 6; ++k) out.sigma[k] = 1 / std::sqrt(eigen.eigenvalues()(k));
+  return out;
+}
+
+}  // namespace
+
+Matrix6 noise_covariance(const Part& part, const Refinement& refinement) {
+  const Held held = held_directions(part, refinement);
+  const Mat6 root = held.scale.asDiagonal() * held.directions * held.sigma.asDiagonal();
+  return Matrix6(root * root.transpose());
+}
+
+void describe_uncertainty(const Part& part, const Matrix6& common_pull, const Refinement& refinement,
+                          Instance& instance) {
   const double lever = part.gyration_mm;
-  const Vec6 scale = scale_of_motion(lever);
+  const Held held = held_directions(part, refinement);
   // Fit residuals beyond the noise (a casting, an unknown systematic term) count as noise.
   const double inflation = std::max(1.0, refinement.rms_sigma * refinement.rms_sigma);
-  Mat6 h = scale.asDiagonal() * Mat6(refinement.information) * scale.asDiagonal();
-  const Mat6 keep = off_directions(free_directions_about_center(part, instance.camera_from_part), Vector6(scale));
-  h = keep * h * keep;
-  const Eigen::SelfAdjointEigenSolver<Mat6> eigen(h);
-  const std::size_t free_count = part.symmetry.continuous.size();
-  Mat6 held = Mat6::Zero();  // the inverse of the information, where there is any
-  Mat6 root = Mat6::Zero();  // its square root: columns
-  for (int k = static_cast<int>(free_count); k < 6; ++k) {
-    const double information = std::max(eigen.eigenvalues()(k) / inflation, 1 / (part.diameter_mm * part.diameter_mm));
-    const Vec6 e = eigen.eigenvectors().col(k);
-    const double sigma = 1 / std::sqrt(information);
-    held += e * e.transpose() * (sigma * sigma);
-    root.col(k) = e * sigma;
-    if (sigma > weak_limit_mm(part)) {
-      WeakDirection weak;
-      const Vec6 d = origin_from_center(part, instance.camera_from_part) * Vec6(scale.cwiseProduct(e));
-      weak.direction = Vector6(d.normalized());
-      weak.sigma_mm = sigma * e.head<3>().norm();
-      weak.sigma = sigma * e.tail<3>().norm() / lever;
-      weak.cure = e.head<3>().norm() > e.tail<3>().norm() ? "a view that shows a face across this direction"
-                                                          : "a view that shows a feature off this axis";
-      instance.weak_directions.push_back(weak);
-    }
-  }
-  // Systematic: the pose follows the sensor's smooth errors as far as the pixels that hold it do.
-  const Mat6 pull = Mat6(scale.asDiagonal()) * Mat6(systematic_pull) * Mat6(scale.asDiagonal());
-  const Mat6 by_systematic = held * (keep * pull * keep) * held / (inflation * inflation);
-  // What patches have in common: in the coordinates in which the noise's covariance is 1, no direction gets less.
-  const Mat6 patches = Mat6(scale.asDiagonal()) * Mat6(patch_pull) * Mat6(scale.asDiagonal()) / (inflation * inflation);
-  const Eigen::SelfAdjointEigenSolver<Mat6> common(Mat6(root.transpose() * patches * root));
-  const Mat6 wide = root * common.eigenvectors() * common.eigenvalues().cwiseMax(1.0).asDiagonal() *
-                    common.eigenvectors().transpose() * root.transpose();
-  Mat6 covariance = Mat6(scale.asDiagonal()) * (wide + by_systematic) * Mat6(scale.asDiagonal());
   const Mat6 to_origin = origin_from_center(part, instance.camera_from_part);
+  for (int k = held.free; k < 6; ++k) {
+    const double sigma = held.sigma[k] * std::sqrt(inflation);
+    if (sigma <= weak_limit_mm(part)) continue;
+    const Vec6 e = held.directions.col(k);
+    WeakDirection weak;
+    weak.direction = Vector6((to_origin * Vec6(held.scale.cwiseProduct(e))).normalized());
+    weak.sigma_mm = sigma * e.head<3>().norm();
+    weak.sigma = sigma * e.tail<3>().norm() / lever;
+    weak.cure = e.head<3>().norm() > e.tail<3>().norm() ? "a view that shows a face across this direction"
+                                                        : "a view that shows a feature off this axis";
+    instance.weak_directions.push_back(weak);
+  }
+  // The pose follows what errors have in common as far as the pixels that hold it do.
+  const Mat6 noise = noise_covariance(part, refinement);
+  Mat6 covariance = noise * inflation + noise * Mat6(common_pull) * noise;
   covariance = to_origin * covariance * to_origin.transpose();
   instance.free_directions.clear();
   for (const Vector6& f : free_directions_about_center(part, instance.camera_from_part)) {

@@ -93,6 +93,7 @@ TEST(RefinePose, MeetsTheTruthWithinTheNoise) {
     off << 0.5, -0.4, 0.6, 0.008, -0.006, 0.007;
     RefineOptions options = options_for_block();
     options.outlines = true;  // from some sides one face is all that is seen
+    options.by_patches = seed % 2 == 0;
     const Refinement refined = refine_pose(render_mesh, scene, moved(truth, off), options);
     const Eigen::Vector3d error = refined.camera_from_part.translation() - truth.translation();
     const double turn = rotation_angle(refined.camera_from_part.linear(), truth.linear());
