@@ -194,11 +194,28 @@ std::optional<Placing> Chooser::place(const Entry& held, const Filling& filling,
     if (!arm_is_clear(arm_with(held.gripper, &held), p.stops[0], std::span(p.stops).subspan(1), bodies_of(*cell_.bin)))
       return false;
     const Start after{p.stops[2].base_from_tcp * flange_from_tcp.inverse(), p.stops[2].joints};
-    return way(after, next_place(held.gripper), held.gripper).has_value();
+    return way(after, next_place(held.gripper, after), held.gripper).has_value();
   };
   auto placing = plan_place(arm_with(held.gripper), in_hand, open, stands, standing, has_ways);
   if (placing && placing->slot == &station) placing->slot = nullptr;
   return placing;
+}
+
+std::optional<Placing> Chooser::place_after(const grasp::Grasp& grasp, const Filling& filling,
+                                            const std::optional<Start>& start, Where where) const {
+  if (start && !way(*start, grasp.path.front().base_from_tcp, grasp.gripper)) return {};
+  Entry held;
+  held.part = grasp.part_name, held.gripper = grasp.gripper, held.opening_mm = grasp.opening_before_mm;
+  held.tcp_from_part = grasp.part_from_tcp.inverse();
+  const grasp::PathPoint& retreat = grasp.path.back();
+  Start carried{retreat.base_from_tcp * shape(grasp.gripper).gripper.flange_from_tcp.inverse(), retreat.joints};
+  if (waits()) {
+    const auto back = whole_way(carried, next_place(grasp.gripper, carried), grasp.gripper, &held);
+    if (!back) return {};
+    carried = {back->back().base_from_tcp * shape(grasp.gripper).gripper.flange_from_tcp.inverse(),
+               back->back().joints};
+  }
+  return place(held, filling, carried, where);
 }
 
 std::optional<Choice> Chooser::choose(const grasp::Plan& plan, const Filling& filling,
@@ -216,20 +233,7 @@ std::optional<Choice> Chooser::choose(const grasp::Plan& plan, const Filling& fi
         ++no_way;
         continue;
       }
-      Entry held;
-      held.part = grasp.part_name, held.gripper = grasp.gripper, held.opening_mm = grasp.opening_before_mm;
-      held.tcp_from_part = grasp.part_from_tcp.inverse();
-      const grasp::PathPoint& retreat = grasp.path.back();
-      Start carried{retreat.base_from_tcp * shape(grasp.gripper).gripper.flange_from_tcp.inverse(), retreat.joints};
-      if (waits()) {
-        const auto back = whole_way(carried, next_place(grasp.gripper), grasp.gripper, &held);
-        if (!back) {
-          ++no_way;
-          continue;
-        }
-        carried = {wait(), back->back().joints};
-      }
-      auto placing = place(held, filling, carried, where);
+      auto placing = place_after(grasp, filling, {}, where);
       if (!placing) {
         ++no_place;
         continue;
@@ -268,8 +272,13 @@ std::vector<robot::Refusal> Chooser::refusals_of(const Choice& choice, double sc
   return out;
 }
 
-Pose Chooser::next_place(const std::string& gripper) const {
-  return waits() ? Pose(wait() * shape(gripper).gripper.flange_from_tcp) : over_bin();
+Pose Chooser::next_place(const std::string& gripper, const Start& from) const {
+  if (!waits()) return over_bin();
+  Pose flange = wait();
+  const Matrix3 turn = flange.linear().transpose() * from.base_from_flange.linear();
+  const double angle = std::atan2(turn(1, 0) - turn(0, 1), turn(0, 0) + turn(1, 1));
+  flange.linear() = flange.linear() * rotation_from_vector(Vec3(0, 0, angle));
+  return flange * shape(gripper).gripper.flange_from_tcp;
 }
 
 Pose Chooser::over_bin() const {

@@ -36,7 +36,7 @@ class Chooser {
 
   /// Of two arms: the waist's angle, and where the other one is, or may be meanwhile.
   void stand_among(double waist, std::vector<grasp::Convex> others);
-  /// base_from_flange where it waits; the identity for a single arm.
+  /// base_from_flange where it waits, but for a turn about the flange's axis; the identity for a single arm.
   Pose wait() const;
   bool waits() const { return cell_.robots.size() > 1 && cell_.robots[number_].wait.has_value(); }
   int arm_number() const { return static_cast<int>(number_) + 1; }
@@ -65,6 +65,9 @@ class Chooser {
                                std::vector<std::string>& why) const;
   /// The first place of that kind for a part that is held like this. \param start  where its way begins
   std::optional<Placing> place(const Entry& held, const Filling& filling, const Start& start, Where where) const;
+  /// The same for a part that a grasp takes first. \param start  where the arm stands; none: its way is not looked at
+  std::optional<Placing> place_after(const grasp::Grasp& grasp, const Filling& filling,
+                                     const std::optional<Start>& start, Where where) const;
   /// The stops of a way; none where it is out of reach.
   std::optional<std::vector<Stop>> way(const Start& start, const Pose& base_from_tcp, const std::string& gripper,
                                        const Entry* held = nullptr) const;
@@ -79,8 +82,9 @@ class Chooser {
   const CellPart& cell_part(const std::string& name) const;
   bool has_station() const { return cell_.regrasp.has_value(); }
   Pose over_bin() const;  ///< the tool above the bin, at the height of its ways
-  /// Where the tool goes when its part is put down: over the bin, or to where one of two arms waits.
-  Pose next_place(const std::string& gripper) const;
+  /// Where the tool goes when its part is put down: over the bin; or to where one of two arms waits, turned about the
+  /// flange's axis as little as can be, since turns take longer than ways.
+  Pose next_place(const std::string& gripper, const Start& from) const;
   /// The TCP's height at which nothing is in the way.
   double travel_mm() const;
   /// Reasons of software against the motion, the controller's state aside.

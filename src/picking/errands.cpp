@@ -43,7 +43,7 @@ bool TwoArms::add_way(Errand& errand, Chooser::Start& at, const Pose& base_from_
 /// The way back, and the room of all of it.
 bool TwoArms::close_errand(Errand& errand, Chooser::Start at, const Entry* held) {
   const Side& one = side(errand.arm);
-  if (!add_way(errand, at, one.chooser.next_place(errand.gripper), true, held)) return false;
+  if (!add_way(errand, at, one.chooser.next_place(errand.gripper, at), true, held)) return false;
   std::vector<Stop> all{one.here};
   for (const Move& move : errand.moves) all.insert(all.end(), move.stops.begin(), move.stops.end());
   all.front().base_from_tcp = one.start().base_from_flange * one.chooser.shape(errand.gripper).gripper.flange_from_tcp;
@@ -56,15 +56,19 @@ std::optional<Errand> TwoArms::place_errand(int arm) {
   Side& one = side(arm);
   const Entry held = *now().hand(arm).in_hand;
   one.chooser.stand_among(waist_, other(arm).bodies(now()));
-  const auto placing = one.chooser.place(held, now().filling, one.start(), Chooser::Where::slots);
+  std::optional<Placing> placing;
+  for (const Chooser::Where where : kAllPlaces)
+    if (!placing && (where == Chooser::Where::slots || station_is_free(nullptr)))
+      placing = one.chooser.place(held, now().filling, one.start(), where);
   if (!placing) return {};
   Errand errand;
-  errand.arm = arm, errand.zone = robot::Zone::rack, errand.gripper = held.gripper;
+  errand.arm = arm, errand.zones = {robot::Zone::rack}, errand.gripper = held.gripper;
   Chooser::Start at = one.start();
   if (!add_way(errand, at, placing->stops[0].base_from_tcp, false, &held)) return {};
   Entry entry = held;
   entry.event = Event::place_ordered;
-  entry.slot = placing->slot->number;
+  entry.slot = placing->slot ? placing->slot->number : 0;
+  entry.from_station = false;
   entry.base_from_part = placing->base_from_part;
   errand.moves.push_back(
       {entry, robot::CycleCommand::place, {placing->stops.begin(), placing->stops.end()}, held.opening_mm, 0});
@@ -81,7 +85,7 @@ std::optional<Errand> TwoArms::pick_errand(int arm, const Choice& choice) {
   Side& one = side(arm);
   const grasp::Grasp& grasp = choice.grasp;
   Errand errand;
-  errand.arm = arm, errand.zone = robot::Zone::bin, errand.gripper = grasp.gripper;
+  errand.arm = arm, errand.zones = {robot::Zone::bin}, errand.gripper = grasp.gripper;
   Chooser::Start at = one.start();
   if (!add_way(errand, at, grasp.path.front().base_from_tcp, false, nullptr)) return {};
   if (const grasp::PathPoint* entry = grasp.at(grasp::Step::entry))
@@ -108,7 +112,7 @@ std::optional<Errand> TwoArms::pick_errand(int arm, const Choice& choice) {
 std::optional<Errand> TwoArms::push_errand(int arm, const grasp::Push& push) {
   Side& one = side(arm);
   Errand errand;
-  errand.arm = arm, errand.zone = robot::Zone::bin, errand.gripper = push.gripper;
+  errand.arm = arm, errand.zones = {robot::Zone::bin}, errand.gripper = push.gripper;
   std::vector<Pose> poses;
   for (const grasp::PathPoint& point : push.path) poses.push_back(point.base_from_tcp);
   const auto stops = stops_at(one.chooser.arm_with(push.gripper), poses);
@@ -151,23 +155,24 @@ void TwoArms::end(Errand& errand, robot::CycleResult result) {
   if (end.event == Event::missed) {
     ++failures_;
     failed_.push_back({scene_, {report.base_from_tcp, report.gripper}});
-    tell(report, "missed");
+    tell(report, "missed", order.from_station ? "at the station" : "");
   }
   if (end.event == Event::lost)
     tell(report, "lost", "the part was not in the gripper any more when it came to its place");
   if (end.event == Event::placed) {
-    ++end_.placed;
-    tell(report, "placed");
+    end_.placed += order.slot > 0;
+    tell(report, order.slot > 0 ? "placed" : "put_down");
   }
 }
 
 void TwoArms::carry_out(std::vector<Errand> errands) {
-  const bool places = std::any_of(errands.begin(), errands.end(),
-                                  [](const Errand& errand) { return errand.zone == robot::Zone::rack; });
+  const auto is_at_rack = [](const Errand& errand) { return errand.zones.back() == robot::Zone::rack; };
+  const bool places = std::any_of(errands.begin(), errands.end(), is_at_rack);
   if (options_.entered) options_.entered(places ? Phase::place : Phase::pick);
   robot::Controller& controller = *links_.controller;
   robot::Clock& clock = *links_.clock;
-  for (const Errand& errand : errands) hand_zone(controller, clock, errand.zone, errand.arm, options_.handshake);
+  for (const Errand& errand : errands)
+    for (const robot::Zone zone : errand.zones) hand_zone(controller, clock, zone, errand.arm, options_.handshake);
   for (bool busy = true; busy;) {
     busy = false;
     for (Errand& errand : errands) {
@@ -177,7 +182,7 @@ void TwoArms::carry_out(std::vector<Errand> errands) {
       }
       if (!errand.open && !errand.moves.empty()) begin(errand);
       if (!errand.open && !errand.home) {
-        hand_zone(controller, clock, errand.zone, 0, options_.handshake);
+        for (const robot::Zone zone : errand.zones) hand_zone(controller, clock, zone, 0, options_.handshake);
         errand.home = true;
       }
       busy = busy || !errand.home;

@@ -8,8 +8,10 @@
 namespace tribin::picking {
 namespace {
 
-constexpr int kScansRemembered = 3;  // a grasp that failed is not tried again in so many
-constexpr int kMostPushes = 5;       // in a row, without a pick
+constexpr int kScansRemembered = 3;       // a grasp that failed is not tried again in so many
+constexpr int kMostPushes = 5;            // in a row, without a pick
+constexpr int kMostTurns = 3;             // at the station, of one part
+constexpr double kTurned = 45 * kDegree;  // a part that is put back as it stood gains nothing
 constexpr Chooser::Where kSlots[] = {Chooser::Where::slots};
 
 /// Grasps of parts that this arm takes at least as well as the other one.
@@ -88,7 +90,8 @@ std::vector<int> TwoArms::holding() const {
 }
 
 bool TwoArms::finish(const std::string& status, const std::string& message) {
-  end_.status = status, end_.message = message;
+  end_.status = status;
+  end_.message = message + (station_trouble_.empty() ? "" : "; " + station_trouble_);
   return false;
 }
 
@@ -125,7 +128,7 @@ bool TwoArms::scan() {
 /// The best grasp of the free arms that leads to a slot, clear of the other arm's errand.
 std::optional<Errand> TwoArms::choose(std::vector<int> free, const Errand* beside) {
   Filling filling = now().filling;
-  if (beside) filling[static_cast<std::size_t>(beside->report.slot) - 1] = beside->report.part;
+  if (beside && beside->report.slot) filling[static_cast<std::size_t>(beside->report.slot) - 1] = beside->report.part;
   std::vector<grasp::FailedPick> failed;
   for (const auto& f : failed_) failed.push_back(f.second);
   StageTimes times;
@@ -147,11 +150,15 @@ std::optional<Errand> TwoArms::choose(std::vector<int> free, const Errand* besid
     for (const int arm : free) {
       const grasp::Plan& own = plans[static_cast<std::size_t>(arm) - 1];
       Side& one = side(arm);
-      auto choice = one.chooser.choose(better_ones(own, plans[static_cast<std::size_t>(2 - arm)]), filling, one.start(),
-                                       kSlots, {}, why);
+      const grasp::Plan better = better_ones(own, plans[static_cast<std::size_t>(2 - arm)]);
+      auto choice = one.chooser.choose(better, filling, one.start(), kSlots, {}, why);
       if (!choice) choice = one.chooser.choose(own, filling, one.start(), kSlots, {}, why);
+      if (!choice && station_is_free(beside))
+        choice = one.chooser.choose(own, filling, one.start(), kAllPlaces, {}, why);
       if (reasons.empty()) reasons = own.reasons;
-      if (choice && (!best || choice->grasp.score > best->grasp.score)) best = choice, best_arm = arm;
+      if (choice && !choice->placing.slot && best) continue;  // gripping anew takes longer
+      if (choice && (!best || (choice->placing.slot && !best->placing.slot) || choice->grasp.score > best->grasp.score))
+        best = choice, best_arm = arm;
     }
     why_ = why.empty() ? text_of(reasons) : text_of(why);
   }
@@ -198,13 +205,62 @@ bool TwoArms::nothing_to_pick() {
   return finish("not_pickable", "no part can be picked: " + why_);
 }
 
+bool TwoArms::station_is_free(const Errand* beside) const {
+  return sides_[0].chooser.has_station() && !now().at_station && !(beside && beside->report.slot == 0);
+}
+
+bool TwoArms::regrasp() {
+  const Entry standing = *now().at_station;
+  const auto give_up = [&](const std::string& why) {  // the others go on without a station
+    station_trouble_ = standing.part + " stands at the station and " + why + ": take it away, then say --slot-is empty";
+    turns_ = 0;
+    CycleReport report;
+    tell(report, "no_pick", station_trouble_);
+    return true;
+  };
+  std::string why = "no gripper is free";
+  for (const int arm : {standing.arm, 3 - standing.arm}) {
+    if (now().hand(arm).in_hand) continue;
+    Side& one = side(arm);
+    one.chooser.stand_among(waist_, other(arm).bodies(now()));
+    links_.vision->plan_for({static_cast<std::size_t>(arm) - 1, waist_, other(arm).bodies(now())});
+    grasp::PlanOptions options = one.chooser.plan_options(Resort::full_tilt, {});
+    for (const auto& f : failed_) options.failed.push_back(f.second);
+    const grasp::Plan plan = links_.vision->plan_standing(standing.part, standing.base_from_part, options,
+                                                          one.chooser.places(now().filling));
+    why = "no grasp leads from there to a slot (" + text_of(plan.reasons) + ")";
+    for (const Chooser::Where where : kAllPlaces)
+      for (const grasp::Grasp& grasp : plan.grasps) {
+        Choice choice{grasp, {}, {}};
+        choice.part.base_from_part = standing.base_from_part;
+        auto placing = one.chooser.place_after(grasp, now().filling, one.start(), where);
+        if (!placing) continue;
+        const Pose turn = placing->base_from_part.inverse() * standing.base_from_part;
+        if (where != Chooser::Where::slots &&
+            (rotation_angle(turn.linear(), Matrix3::Identity()) < kTurned || turns_ >= kMostTurns))
+          continue;
+        choice.placing = std::move(*placing);
+        std::optional<Errand> errand = pick_errand(arm, choice);
+        if (!errand) continue;
+        errand->zones = {robot::Zone::bin, robot::Zone::rack};
+        for (Move& move : errand->moves)
+          if (move.command == robot::CycleCommand::pick) move.entry.from_station = true;
+        turns_ = where == Chooser::Where::slots ? 0 : turns_ + 1;
+        carry_out({*errand});
+        return now().hand(arm).in_hand ? true : give_up("is not gripped, so that it does not stand there as it should");
+      }
+  }
+  return give_up(why);
+}
+
 bool TwoArms::round() {
   const std::vector<int> hold = holding();
   const auto open = open_slots(sides_[0].chooser.slots(), now().filling, links_.cell->rack->when_missing);
-  const int most = options_.most_parts;
+  const int most = options_.most_parts, held = static_cast<int>(hold.size());
   if (hold.empty() && open.empty()) return finish("rack_full", "every slot of the rack holds a part");
   if (hold.empty() && most > 0 && end_.placed >= most)
     return finish("most_parts", std::to_string(end_.placed) + " parts are placed, as many as were asked for");
+  if (now().at_station && station_trouble_.empty() && held < 2) return regrasp();
   std::optional<Errand> at_rack;
   if (!hold.empty()) {
     at_rack = place_errand(hold.front());
@@ -213,7 +269,6 @@ bool TwoArms::round() {
                                         now().hand(hold.front()).in_hand->part +
                                         ", and no open slot can be reached with it");
   }
-  const int held = static_cast<int>(hold.size());
   const bool wanted = held < 2 && static_cast<int>(open.size()) > held && (most == 0 || end_.placed + held < most);
   std::optional<Errand> in_bin;
   if (wanted) {

@@ -9,8 +9,8 @@
 /// Each round begins and ends with both where they wait, out of the camera's sight. What an arm does in between is an
 /// errand in one zone, planned as a whole before it begins: the errand of the arm that holds a part first, then that of
 /// the other, whose arm, gripper and part keep clear of all the room that the first one passes through. So it does not
-/// matter which is faster. Where no grasp is that clear, the errands come one after the other. Who is in a zone stands
-/// in the controller, whose jobs do not go where another is.
+/// matter which is faster. At the station, an arm has both zones. Where no grasp is that clear, the errands come one
+/// after the other. Who is in a zone stands in the controller, whose jobs do not go where another is.
 namespace tribin::picking {
 
 /// One order to the hand-shake.
@@ -25,7 +25,7 @@ struct Move {
 /// What one arm does, from where it waits and back to there.
 struct Errand {
   int arm = 1;
-  robot::Zone zone = robot::Zone::bin;
+  std::vector<robot::Zone> zones;  ///< that are its own meanwhile
   std::string gripper;
   std::deque<Move> moves;
   std::vector<grasp::Convex> room;  ///< boxes that arm, gripper and part stay in; base frame
@@ -59,6 +59,8 @@ class TwoArms {
   bool scan();   ///< \return whether picking may go on
   std::optional<Errand> choose(std::vector<int> free, const Errand* other);
   std::optional<Errand> push();
+  bool regrasp();  ///< what stands at the station is taken by an arm while the other one waits
+  bool station_is_free(const Errand* beside) const;
   bool nothing_to_pick();
   // errands.cpp
   std::optional<Errand> place_errand(int arm);
@@ -92,6 +94,8 @@ class TwoArms {
   int scene_ = 0, pushes_ = 0, failures_ = 0;
   double scan_s_ = 0, waist_ = 0;
   std::string why_;
+  std::string station_trouble_;  ///< why what stands at the station stays there; empty = it does not
+  int turns_ = 0;                ///< at the station, of one part
   std::vector<std::pair<int, grasp::FailedPick>> failed_;  ///< with the scene
   RunEnd end_;
 };

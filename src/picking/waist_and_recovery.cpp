@@ -42,7 +42,7 @@ bool TwoArms::ask_where(Side& one) {
 
 /// An arm that a crash left on its way goes back to where it waits, if that is clear of the other one.
 bool TwoArms::bring_home(Side& one, const Side& beside) {
-  const Pose wait = one.chooser.next_place(one.gripper);
+  const Pose wait = one.chooser.next_place(one.gripper, one.start());
   if ((wait.translation() - one.here.base_from_tcp.translation()).norm() < kThere_mm &&
       rotation_angle(wait.linear(), one.here.base_from_tcp.linear()) < kThere)
     return true;
@@ -54,7 +54,8 @@ bool TwoArms::bring_home(Side& one, const Side& beside) {
   one.chooser.stand_among(waist_, beside.bodies(now()));
   Errand errand;
   errand.arm = arm, errand.gripper = one.gripper;
-  errand.zone = in_bin == arm ? robot::Zone::bin : robot::Zone::rack;
+  if (in_bin == arm) errand.zones.push_back(robot::Zone::bin);
+  if (at_rack == arm) errand.zones.push_back(robot::Zone::rack);
   if (!close_errand(errand, one.start(), one.held(now())))
     return in_doubt(arm, "arm " + std::to_string(arm) + " finds no way back to where it waits");
   carry_out({errand});

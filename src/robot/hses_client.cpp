@@ -42,7 +42,7 @@ class HsesClient : public Controller {
   CartesianPosition position(int frame, int arm) override {
     if (frame != 1)
       throw ControllerError(ControllerFault::not_sent, "only frame 1 (robot) can be read over this protocol");
-    const auto position = position_of(read(0x75, 100 + arm, 0, 52));
+    const auto position = position_of(read(0x75, arm == 2 ? 102 : 101, 0, 52));
     if (!position || position->index() != 0) bad("position");
     return std::get<CartesianPosition>(*position);
   }

@@ -16,7 +16,7 @@ class Nx100Client : public Controller {
 
   ControllerStatus status() override { return read("RSTATS", "", status_of); }
   CartesianPosition position(int frame, int arm) override {
-    if (arm != group_) {  // a choice of the controller's, which stays; it is made anew where it may not have come
+    if (arm != 0 && arm != group_) {  // a choice of the controller's, which stays; it is made anew where it may not have come
       group_ = 0;
       command("CGROUP", std::to_string(1 << (arm - 1)) + ",0");
       group_ = arm;
@@ -216,7 +216,7 @@ class Nx100Client : public Controller {
       fail(ControllerFault::unknown_outcome, std::string(name) + ": saw '" + answer.substr(0, 80) + "', wanted 0000");
   }
 
-  int group_ = 1;  ///< arm that positions are asked of; 0 = not known
+  int group_ = 0;  ///< arm that this client asked positions of; 0 = not known: the choice outlives a client
   std::unique_ptr<ByteStream> stream_;
   Clock& clock_;
   Nx100Options options_;

@@ -165,10 +165,11 @@ int main(int argc, char** argv) try {
       for (const auto& reason : report.refused) totals.refused[std::string(name_of(reason.why))] += reason.count;
       if (verbose)
         std::printf(
-            "    scene %d cycle %d %s %s %s (%s) slot %d resort %s score %.3f find %.0f ms plan %.0f ms %.1f s %s\n",
-            report.scene, report.cycle, report.state.c_str(), report.part.c_str(), report.grasp.c_str(),
-            report.gripper.c_str(), report.slot, std::string(name_of(report.resort)).c_str(), report.score,
-            report.find_ms, report.plan_ms, report.robot_s, report.note.c_str());
+            "    %.1f s: scene %d cycle %d %s %s %s (%s) slot %d resort %s score %.3f find %.0f ms plan %.0f ms %.1f s "
+            "%s\n",
+            simulated.clock().now_s(), report.scene, report.cycle, report.state.c_str(), report.part.c_str(),
+            report.grasp.c_str(), report.gripper.c_str(), report.slot, std::string(name_of(report.resort)).c_str(),
+            report.score, report.find_ms, report.plan_ms, report.robot_s, report.note.c_str());
       if (verbose && report.state == "missed")
         std::printf("      %s\n", about_miss(simulated.truth(), report, vision->model(report.part)).c_str());
       std::fflush(stdout);

@@ -74,50 +74,51 @@ class FakeTruth {
   void refill(int parts) {
     in_bin.assign(static_cast<std::size_t>(parts), true);
     rack.assign(slots_.size(), {});
-    held = -1;
+    held = held_by_second = -1;
     save();
   }
 
   controller_sim::MachineOptions machine_options() {
     controller_sim::MachineOptions options;
     options.on_output = [this](controller_sim::Machine& machine, int output, bool on) {
-      if (output == 1) machine.set_input(1, on ? grip(machine) : let_go(machine));
+      if (output <= machine.arms()) machine.set_input(output, on ? grip(machine, output) : let_go(machine, output));
     };
     return options;
   }
 
   std::vector<bool> in_bin;
   std::vector<std::vector<std::string>> rack;  ///< what was put into each slot: more than one is too much
-  int held = -1, lost = 0, grips = 0;
+  int held = -1, held_by_second = -1, lost = 0, grips = 0;
   std::vector<int> slippery;  ///< parts that the next grip misses
 
  private:
   /// Of the foot of what is gripped.
-  static Vec3 at(const controller_sim::Machine& machine) {
-    return robot::pose_of(machine.position()).translation() - Vec3(0, 0, kGrip_mm);
+  static Vec3 at(const controller_sim::Machine& machine, int arm) {
+    return robot::pose_of(machine.position(arm)).translation() - Vec3(0, 0, kGrip_mm);
   }
 
-  bool grip(const controller_sim::Machine& machine) {
+  bool grip(const controller_sim::Machine& machine, int arm) {
     ++grips;
-    for (std::size_t i = 0; i < in_bin.size() && held < 0; ++i) {
-      if (!in_bin[i] || (at(machine) - place_in_bin(static_cast<int>(i))).norm() > 1) continue;
+    int& hand = arm == 1 ? held : held_by_second;
+    for (std::size_t i = 0; i < in_bin.size() && hand < 0; ++i) {
+      if (!in_bin[i] || (at(machine, arm) - place_in_bin(static_cast<int>(i))).norm() > 1) continue;
       const auto slips = std::find(slippery.begin(), slippery.end(), static_cast<int>(i));
       if (slips != slippery.end()) {
         slippery.erase(slips);
         return false;
       }
-      held = static_cast<int>(i);
+      hand = static_cast<int>(i);
       in_bin[i] = false;
     }
     save();
-    return held >= 0;
+    return hand >= 0;
   }
-  bool let_go(const controller_sim::Machine& machine) {
-    const int part = std::exchange(held, -1);
+  bool let_go(const controller_sim::Machine& machine, int arm) {
+    const int part = std::exchange(arm == 1 ? held : held_by_second, -1);
     if (part < 0) return false;
     bool placed = false;
     for (std::size_t i = 0; i < slots_.size(); ++i)
-      if ((slots_[i].base_from_slot.translation() - at(machine)).norm() < 1) {
+      if ((slots_[i].base_from_slot.translation() - at(machine, arm)).norm() < 1) {
         rack[i].push_back(kind_of(part));
         placed = true;
       }
@@ -152,6 +153,8 @@ class FakeVision : public picking::Vision {
       models_.push_back(part);
     }
   }
+
+  void plan_for(const picking::ArmAtWork& arm) override { at_work_ = arm; }
 
   picking::Sight scan(const picking::FlangePose& flange) override {
     ++scans;
@@ -220,26 +223,27 @@ class FakeVision : public picking::Vision {
   grasp::Grasp grasp_at(int part, const Pose& at) const {
     grasp::Grasp grasp;
     grasp.part = grasp.id = part;
-    grasp.part_name = kind_of(part), grasp.gripper = "jaw", grasp.family = "top";
+    grasp.part_name = kind_of(part), grasp.gripper = at_work_.robot ? "jaw_2" : "jaw", grasp.family = "top";
     Pose base_from_part = Pose::Identity();
     base_from_part.translation() = place_in_bin(part);
     grasp.part_from_tcp = base_from_part.inverse() * at;
     grasp.opening_before_mm = 50;
     grasp.score = 1;
-    const robot::Arm& arm = robot_.arms.front();
+    const robot::Arm& arm = robot_.arms.at(at_work_.robot);
     for (const auto& [step, up] : {std::pair{grasp::Step::pre_pick, 80.0}, std::pair{grasp::Step::pick, 0.0},
                                    std::pair{grasp::Step::retreat, 120.0}}) {
       grasp::PathPoint point{step, at, {}};
       point.base_from_tcp.translation().z() += up;
       Pose flange = point.base_from_tcp;
       flange.translation().z() += 150;
-      point.joints = reach(arm, base_from_arm(robot_, arm).inverse() * flange)->joints;
+      point.joints = reach(arm, base_from_arm(robot_, arm, at_work_.waist).inverse() * flange)->joints;
       grasp.path.push_back(point);
     }
     return grasp;
   }
 
   const robot::RobotModel& robot_;
+  picking::ArmAtWork at_work_;
   std::function<std::vector<bool>()> in_bin_;
   std::vector<bool> seen_;
   std::vector<Part> models_;

@@ -109,8 +109,8 @@ class Controller {
   Controller& operator=(const Controller&) = delete;
 
   virtual ControllerStatus status() = 0;
-  /// \param arm  from 1, of those that the controller drives
-  virtual CartesianPosition position(int frame = 1, int arm = 1) = 0;
+  /// \param arm  1 or 2, of two; 0 = of the only one
+  virtual CartesianPosition position(int frame = 1, int arm = 0) = 0;
   virtual PulsePosition pulses() = 0;
   virtual ControllerAlarms alarms() = 0;
   virtual RunningJob running_job() = 0;
