@@ -16,7 +16,8 @@ class Nx100Client : public Controller {
 
   ControllerStatus status() override { return read("RSTATS", "", status_of); }
   CartesianPosition position(int frame, int arm) override {
-    if (arm != 0 && arm != group_) {  // a choice of the controller's, which stays; it is made anew where it may not have come
+    if (arm != 0 &&
+        arm != group_) {  // a choice of the controller's, which stays; it is made anew where it may not have come
       group_ = 0;
       command("CGROUP", std::to_string(1 << (arm - 1)) + ",0");
       group_ = arm;
