@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "tribin/cad/half_edges.hpp"
+#include "tribin/cad/nearest.hpp"
 #include "tribin/core/error.hpp"
 
 namespace tribin {
@@ -23,27 +24,6 @@ constexpr double kSagittaFactor = 1.5;
 constexpr double kLargestSlack = 0.015;  // of the diameter
 constexpr double kSameFacet = 4;         // ratio of widths
 constexpr int kLeafSize = 4;
-
-Vec3 nearest_on_triangle(const Vec3& a, const Vec3& ab, const Vec3& ac, const Vec3& p) {
-  // Ericson, Real-Time Collision Detection, 5.1.5: by Voronoi regions.
-  const Vec3 ap = p - a;
-  const double d1 = ab.dot(ap), d2 = ac.dot(ap);
-  if (d1 <= 0 && d2 <= 0) return a;
-  const Vec3 bp = ap - ab;
-  const double d3 = ab.dot(bp), d4 = ac.dot(bp);
-  if (d3 >= 0 && d4 <= d3) return a + ab;
-  const double vc = d1 * d4 - d3 * d2;
-  if (vc <= 0 && d1 >= 0 && d3 <= 0) return a + d1 / (d1 - d3) * ab;
-  const Vec3 cp = ap - ac;
-  const double d5 = ab.dot(cp), d6 = ac.dot(cp);
-  if (d6 >= 0 && d5 <= d6) return a + ac;
-  const double vb = d5 * d2 - d1 * d6;
-  if (vb <= 0 && d2 >= 0 && d6 <= 0) return a + d2 / (d2 - d6) * ac;
-  const double va = d3 * d6 - d5 * d4;
-  if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0) return a + ab + (d4 - d3) / ((d4 - d3) + (d5 - d6)) * (ac - ab);
-  const double scale = 1 / (va + vb + vc);
-  return a + vb * scale * ab + vc * scale * ac;
-}
 
 }  // namespace
 

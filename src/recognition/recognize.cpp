@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "instance_report.hpp"
+#include "keep_apart.hpp"
 #include "selection.hpp"
 #include "tribin/core/error.hpp"
 #include "tribin/core/parallel.hpp"
@@ -244,6 +245,7 @@ Instances recognize(const Primitives& primitives, const PrimitiveModel& observat
       out.items.push_back(std::move(instance));
     }
   }
+  keep_apart(parts, scene, options.bin, out.items, out.rejected);
   int id = 0;
   for (std::vector<Instance>* list : {&out.items, &out.uncertain}) {
     std::stable_sort(list->begin(), list->end(),
