@@ -207,6 +207,8 @@ Fields<Rack> rack_fields() {
   fields.texts("sequence", &Rack::sequence, "names of parts, placed in turn; none: any part");
   fields.choice("when_missing", {{"skip", WhenMissing::skip}, {"wait", WhenMissing::wait}}, &Rack::when_missing,
                 "the next slot's part is not seen: fill a later slot, or wait for it");
+  fields.flag("check_by_scan", &Rack::check_by_scan,
+              "a slot is filled only where the last scan sees all of its room and nothing in it");
   return fields.number("chamfer_mm", "mm", {0, 1000}, &Rack::chamfer_mm, "of a slot: what a place error may be");
 }
 

@@ -166,6 +166,23 @@ std::optional<std::vector<Stop>> Chooser::whole_way(const Start& start, const Po
   return stops;
 }
 
+std::string Chooser::scan_against(const Slot& slot, const CellPart& part) const {
+  if (!cell_.rack->check_by_scan) return {};
+  const Part& model = vision_.model(part.name);
+  Pose middle = slot.base_from_slot * part.slot_from_part;
+  middle.translation() = middle * model.box_center();
+  switch (vision_.room(middle, model.box_max - model.box_min)) {
+    case RoomSeen::empty:
+      return {};
+    case RoomSeen::occupied:
+      return std::string(robot::name_of(robot::RefusalCode::slot_occupied)) + ": the scan shows something in " +
+             name_of(slot) + ", wanted it empty";
+    default:
+      return std::string(robot::name_of(robot::RefusalCode::slot_occupied)) + ": the scan does not show all of " +
+             name_of(slot) + ", wanted it seen empty";
+  }
+}
+
 std::optional<Placing> Chooser::place(const Entry& held, const Filling& filling, const Start& start,
                                       Where where) const {
   const CellPart& part = cell_part(held.part);
@@ -174,7 +191,7 @@ std::optional<Placing> Chooser::place(const Entry& held, const Filling& filling,
   Slot station;
   if (where == Where::slots) {
     for (const Slot* slot : open_slots(slots_, filling, cell_.rack->when_missing))
-      if (may_stand(*slot, held.part)) open.push_back(slot);
+      if (may_stand(*slot, held.part) && scan_against(*slot, part).empty()) open.push_back(slot);
     stands = alike(vision_.model(held.part), part.slot_from_part);
   } else if (has_station()) {
     station.base_from_slot = cell_.regrasp->base_from_station;
@@ -245,6 +262,12 @@ std::optional<Choice> Chooser::choose(const grasp::Plan& plan, const Filling& fi
         if (std::find(why.begin(), why.end(), refusal.message) == why.end()) why.push_back(refusal.message);
     }
   }
+  for (const Slot* slot : open_slots(slots_, filling, cell_.rack->when_missing))
+    for (const CellPart& part : cell_.parts) {
+      if (no_place == 0 || !may_stand(*slot, part.name)) continue;
+      const std::string against = scan_against(*slot, part);
+      if (!against.empty() && std::find(why.begin(), why.end(), against) == why.end()) why.push_back(against);
+    }
   if (no_way > 0) why.push_back(std::to_string(no_way) + " times no way to the grasp from where the arm stands");
   if (no_place > 0) why.push_back(std::to_string(no_place) + " times no way for its part into a slot");
   return {};

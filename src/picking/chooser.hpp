@@ -91,6 +91,9 @@ class Chooser {
   std::vector<robot::Refusal> refusals_of(const Choice& choice, double scan_age_s) const;
 
  private:
+  /// Why a part may not go to a slot, by the last scan; empty = it may. Not asked where the rack does not say so.
+  std::string scan_against(const Slot& slot, const CellPart& part) const;
+
   const WorkCell& cell_;
   const robot::RobotModel& robot_;
   Vision& vision_;

@@ -46,6 +46,11 @@ class CameraVision : public Vision {
     return sight;
   }
 
+  RoomSeen room(const Pose& base_from_box, const Vec3& size_mm) const override {
+    if (!found_) return RoomSeen::hidden;
+    return look_into(scan_, base_from_camera_, base_from_box, size_mm, from_.cell->hand_eye.sigma_mm);
+  }
+
   const Scan* last_scan() const override { return found_ ? &scan_ : nullptr; }
 
   void plan_for(const ArmAtWork& arm) override { at_work_ = arm; }

@@ -200,6 +200,27 @@ TEST(Cycle, ATightSlotIsRefusedWithItsReason) {
   EXPECT_EQ(bench.truth.grips, 0);
 }
 
+TEST(Cycle, ASlotThatTheScanDoesNotShowEmptyIsLeft) {
+  WorkCell cell = test::fake_work_cell();
+  const std::vector<Slot> slots = slots_of(*cell.rack);
+  for (const RoomSeen seen : {RoomSeen::occupied, RoomSeen::hidden}) {
+    cell.rack->check_by_scan = false;
+    Bench trusting(8, cell);
+    trusting.vision.rooms = {{slots[0].base_from_slot.translation(), seen}};
+    EXPECT_EQ(trusting.run().placed, 6);
+    cell.rack->check_by_scan = true;
+    Bench bench(8, cell);
+    bench.vision.rooms = {{slots[0].base_from_slot.translation(), seen}};
+    const RunEnd end = bench.run();
+    EXPECT_EQ(end.placed, 5);
+    EXPECT_TRUE(bench.truth.rack[0].empty());
+    EXPECT_EQ(end.status, "not_pickable");
+    EXPECT_NE(end.message.find("slot_occupied: the scan "), std::string::npos) << end.message;
+    EXPECT_NE(end.message.find("slot 1 (a)"), std::string::npos) << end.message;
+    bench.expect_truth_is_as_told();
+  }
+}
+
 /// The order to pick part b for slot 2.
 Entry order_of_next(const Journal& journal) {
   Entry entry;

@@ -11,7 +11,9 @@
 #include "support/solids.hpp"
 #include "tribin/config/robot_file.hpp"
 #include "tribin/io/cad_files.hpp"
+#include "tribin/part/part.hpp"
 #include "tribin/picking/rack.hpp"
+#include "tribin/picking/vision.hpp"
 #include "tribin/robot/handshake.hpp"
 
 namespace tribin::sim {
@@ -291,6 +293,34 @@ TEST(SimulatedCell, ACameraOnTheFlangeSeesFromWhereTheArmStands) {
     EXPECT_GT(floor, 500);
     EXPECT_LT(below, floor / 50);
   }
+}
+
+TEST(SimulatedCell, AScanShowsWhichRoomIsEmpty) {
+  const SmallCell small;
+  SimulatedCellOptions options;
+  options.parts = 3;
+  options.hand_eye_mm = options.hand_eye_rad = 0;
+  SimulatedCell cell(small.cell, small.robot, small.stock, options);
+  const Scan scan = std::get<Scan>(cell.camera().grab().content);
+  const Pose base_from_camera = tribin::base_from_camera(small.cell) * scan.input_from_camera;
+  const auto seen = [&](const Pose& at, const Vec3& size) {
+    return picking::look_into(scan, base_from_camera, at, size, small.cell.hand_eye.sigma_mm);
+  };
+  const Vec3 room(110, 66, 90);
+  const Part part = compile_part(small.stock->meshes.front());
+  for (const PartTruth& truth : cell.truth().parts) {
+    Pose middle = truth.base_from_part;
+    middle.translation() = middle * part.box_center();
+    EXPECT_EQ(seen(middle, part.box_max - part.box_min), picking::RoomSeen::occupied);
+    middle.translation().z() -= 250;
+    EXPECT_EQ(seen(middle, room), picking::RoomSeen::hidden);  // below the floor
+  }
+  Pose above = small.cell.bin->base_from_bin;
+  above.translation().z() += 350;
+  EXPECT_EQ(seen(above, room), picking::RoomSeen::empty);
+  Pose aside = Pose::Identity();
+  aside.translation() = Vec3(1300, 1500, 100);
+  EXPECT_EQ(seen(aside, room), picking::RoomSeen::hidden);  // out of view
 }
 
 TEST(SimulatedCell, TouchingThePartOrTheBinIsNoted) {

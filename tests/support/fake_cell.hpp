@@ -211,6 +211,13 @@ class FakeVision : public picking::Vision {
   }
   const Part& model(const std::string& name) const override { return models_[name == "b"]; }
 
+  picking::RoomSeen room(const Pose& base_from_box, const Vec3&) const override {
+    for (const auto& [at, seen] : rooms)
+      if ((at - base_from_box.translation()).norm() < 40) return seen;
+    return picking::RoomSeen::empty;
+  }
+
+  std::vector<std::pair<Vec3, picking::RoomSeen>> rooms;  ///< that are not empty
   int scans = 0, pushes = 0, pushes_to_free = 1;
   std::map<int, bool> hard;        ///< parts that only full tilt takes
   std::vector<int> buried;         ///< parts that a push frees

@@ -108,6 +108,7 @@ struct Rack {
   std::vector<GivenSlot> given;       ///< in place of the grid, in the order of filling
   std::vector<std::string> sequence;  ///< names of parts, used in turn
   double chamfer_mm = 0;              ///< of a slot: what a place error may be
+  bool check_by_scan = false;         ///< a slot is filled where the last scan shows that it is empty
   WhenMissing when_missing = WhenMissing::skip;
 };
 

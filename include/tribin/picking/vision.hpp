@@ -38,6 +38,18 @@ struct ArmAtWork {
   std::vector<grasp::Convex> others;  ///< where the other arm is, or may be meanwhile; base frame
 };
 
+/// What a scan shows of a room where nothing should be.
+enum class RoomSeen {
+  empty,
+  occupied,
+  hidden,  ///< not all of it is seen: out of view, in a shadow, behind something
+};
+/// \param base_from_box   the room: a box about its frame's origin, axes along it
+/// \param sigma_mm        of where the camera stands: what is nearer to the room's sides than three of it, and three of
+///                        the scan's noise, is not told from what stands beside
+RoomSeen look_into(const Scan& scan, const Pose& base_from_camera, const Pose& base_from_box, const Vec3& size_mm,
+                   double sigma_mm);
+
 class Vision {
  public:
   virtual ~Vision() = default;
@@ -48,6 +60,11 @@ class Vision {
   virtual Sight scan(const FlangePose& flange) = 0;
   /// The last scan. \return null before the first one, and where there is no camera
   virtual const Scan* last_scan() const { return nullptr; }
+  /// Of the last scan; see look_into above.
+  virtual RoomSeen room(const Pose& base_from_box, const Vec3& size_mm) const {
+    (void)base_from_box, (void)size_mm;
+    return RoomSeen::hidden;
+  }
   /// Grasps for what the last scan showed. May be asked again with other options.
   virtual grasp::Plan plan(const grasp::PlanOptions& options, const Places& places) = 0;
   virtual grasp::PushPlan plan_pushes(const grasp::PlanOptions& options) = 0;
