@@ -75,7 +75,7 @@ std::optional<Errand> TwoArms::place_errand(int arm) {
   at = {placing->stops[2].base_from_tcp * one.chooser.shape(held.gripper).gripper.flange_from_tcp.inverse(),
         placing->stops[2].joints};
   if (!close_errand(errand, at, nullptr)) return {};
-  CycleReport& report = errand.report;
+  CycleReport& report = errand.report = std::exchange(one.picked, {});
   report.arm = arm, report.part = held.part, report.gripper = held.gripper, report.grasp = held.grasp;
   report.slot = entry.slot, report.base_from_part = held.base_from_part;
   return errand;
@@ -151,7 +151,10 @@ void TwoArms::end(Errand& errand, robot::CycleResult result) {
   CycleReport& report = errand.report;
   report.cycle = order.cycle;
   if (!order.note.empty()) tell(report, "pushed", why_);
-  if (end.event == Event::picked) failures_ = pushes_ = 0, resort_ = Resort::none;
+  if (end.event == Event::picked) {
+    failures_ = pushes_ = 0, resort_ = Resort::none;
+    side(errand.arm).picked = report;
+  }
   if (end.event == Event::missed) {
     ++failures_;
     failed_.push_back({scene_, {report.base_from_tcp, report.gripper}});

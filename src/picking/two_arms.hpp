@@ -42,6 +42,7 @@ struct Side {
   const robot::Arm* arm;
   std::string gripper;  ///< that it has on
   Stop here;            ///< where it waits
+  CycleReport picked;   ///< of what it holds: the line of its place tells of its grasp too
   const Entry* held(const JournalState& state) const;
   Chooser::Start start() const;
   /// The arm, without what never moves, the gripper and what it holds.
