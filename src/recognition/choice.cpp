@@ -21,9 +21,8 @@ struct Finalist {
   Matrix6 information = Matrix6::Zero();  ///< of its refinement
 };
 
-/// Refines every pose at a render step and ranks them, the likeliest first.
-void compare(const SceneDepth& scene, const Part& part, Detail detail, int step, int iterations, double start_mm,
-             std::vector<Finalist>& finalists) {
+void refine(const SceneDepth& scene, const Part& part, Detail detail, int step, int iterations, double start_mm,
+            std::span<Finalist> finalists) {
   RefineOptions options = refine_options(part, detail, step, iterations, std::max(start_mm, 4 * scene.median_sigma_mm));
   options.outlines = true;
   parallel_each(static_cast<int>(finalists.size()), [&](int i) {
@@ -32,6 +31,10 @@ void compare(const SceneDepth& scene, const Part& part, Detail detail, int step,
     f.pose = refined.camera_from_part;
     f.information = refined.information;
   });
+}
+
+/// The likeliest first.
+void rank(const SceneDepth& scene, const Part& part, Detail detail, int step, std::vector<Finalist>& finalists) {
   std::vector<std::pair<const Part*, Pose>> poses;
   for (const Finalist& f : finalists) poses.emplace_back(&part, f.pose);
   const Ranking ranking = rank_poses(scene, detail, poses, step);
@@ -41,6 +44,21 @@ void compare(const SceneDepth& scene, const Part& part, Detail detail, int step,
     ranked.back().log_likelihood = ranking.log_odds[i];
   }
   finalists = std::move(ranked);
+}
+
+/// Only those that are near the first.
+void drop_unlikely(double behind, std::vector<Finalist>& finalists) {
+  std::erase_if(finalists, [least = finalists[0].log_likelihood - behind](const Finalist& f) {
+    return f.log_likelihood < least;
+  });
+}
+
+constexpr std::ptrdiff_t kEven = 8;
+
+/// Where so many poses are even, what would tell them apart is not in view: more pixels would not show it.
+bool nothing_tells(const std::vector<Finalist>& finalists) {
+  return std::count_if(finalists.begin(), finalists.end(), [](const Finalist& f) { return f.log_likelihood > -1; }) >=
+         kEven;
 }
 
 }  // namespace
@@ -75,7 +93,7 @@ PoseCandidate looked_at_closely(const SceneDepth& scene, const Part& part, const
 PoseCandidate settled_on_scan(const SceneDepth& scene, const Part& part, const PoseCandidate& candidate) {
   std::vector<Finalist> one = {{candidate.camera_from_part}};
   const int step = step_for(part, scene, candidate.camera_from_part, kPolishPixels);
-  compare(scene, part, Detail::full, step, 5, 0.012 * part.diameter_mm, one);
+  refine(scene, part, Detail::full, step, 5, 0.012 * part.diameter_mm, one);
   PoseCandidate out = candidate;
   out.camera_from_part = one[0].pose;
   out.information = one[0].information;
@@ -120,15 +138,20 @@ Polished polish_once(const SceneDepth& scene, std::span<const Part> parts, const
   std::vector<Pose> poses = rivals(scene, part, settled.camera_from_part);
   add_weakest_moves(part, settled, poses);
   poses.insert(poses.end(), also.begin(), also.end());
+  const std::vector<Pose> turned = spins(scene, part, settled.camera_from_part);
+  const std::size_t first_rival = 1 + turned.size();
+  poses.insert(poses.begin(), turned.begin(), turned.end());
   poses.insert(poses.begin(), settled.camera_from_part);
   std::vector<Verification> checks(poses.size());
   parallel_each(static_cast<int>(poses.size()), [&](int i) {
     const auto k = static_cast<std::size_t>(i);
-    if (k > 0) {
-      const double start = std::max(0.012 * part.diameter_mm, noise);
-      RefineOptions options = refine_options(part, Detail::coarse, few, 3, start);
-      options.outlines = true;
+    RefineOptions options = refine_options(part, Detail::coarse, few, 3, std::max(0.012 * part.diameter_mm, noise));
+    options.outlines = true;
+    if (k >= first_rival) {
       poses[k] = refine_guarded(part, Detail::coarse, scene, poses[k], options).camera_from_part;
+    } else if (k > 0) {  // what the settled pose gets wrong of its place, because its spin is, two steps mend
+      options.iterations = 2;
+      poses[k] = refine_pose(part.coarse_mesh, scene, poses[k], options).camera_from_part;
     }
     checks[k] = verify_pose(part.coarse_mesh, scene, poses[k],
                             verification_options(part, Detail::coarse, few, 0.004 * part.diameter_mm));
@@ -171,22 +194,27 @@ Polished polish_once(const SceneDepth& scene, std::span<const Part> parts, const
                    [](const Finalist& a, const Finalist& b) { return a.log_likelihood > b.log_likelihood; });
   // Three steps on few pixels leave a quarter of what is still unexplained to the finer ones (a fifth at most, seen on
   // 70 polishes of nearly round parts).
-  const double behind = kUndecided - 0.25 * finalists[0].log_likelihood;
-  std::erase_if(finalists,
-                [least = finalists[0].log_likelihood - behind](const Finalist& f) { return f.log_likelihood < least; });
+  drop_unlikely(kUndecided - 0.25 * finalists[0].log_likelihood, finalists);
 
-  // Fine: the survivors on more pixels, compared by likelihood; those that stay near the best once more on all pixels.
+  // Fine: the survivors on more pixels. Where many stay even as they are, no fit of each would tell them apart. Else they
+  // are fitted, and those that stay near the best are compared once more on all pixels.
   const int fine = step_for(part, scene, settled.camera_from_part, kPolishPixels);
-  if (finalists.size() > 1) compare(scene, part, Detail::full, fine, 5, 0.012 * part.diameter_mm, finalists);
-  std::erase_if(finalists, [best = finalists[0].log_likelihood](const Finalist& f) {
-    return f.log_likelihood < best - kUndecided;
-  });
-  // Where so many poses remain even, what would tell them apart is not in view: more pixels would not show it.
-  constexpr std::ptrdiff_t kEven = 8;
-  const auto even =
-      std::count_if(finalists.begin(), finalists.end(), [](const Finalist& f) { return f.log_likelihood > -1; });
-  if (finalists.size() > 1 && even < kEven)
-    compare(scene, part, Detail::full, step_for(part, scene, settled.camera_from_part, kDecidePixels), 2, 0, finalists);
+  if (finalists.size() >= kEven) {
+    rank(scene, part, Detail::full, fine, finalists);
+    drop_unlikely(2 * kUndecided, finalists);
+  }
+  if (nothing_tells(finalists)) {
+    refine(scene, part, Detail::full, fine, 5, 0.012 * part.diameter_mm, std::span(finalists).first(1));
+  } else if (finalists.size() > 1) {
+    refine(scene, part, Detail::full, fine, 5, 0.012 * part.diameter_mm, finalists);
+    rank(scene, part, Detail::full, fine, finalists);
+    drop_unlikely(kUndecided, finalists);
+    if (finalists.size() > 1 && !nothing_tells(finalists)) {
+      const int all = step_for(part, scene, settled.camera_from_part, kDecidePixels);
+      refine(scene, part, Detail::full, all, 2, 0, finalists);
+      rank(scene, part, Detail::full, all, finalists);
+    }
+  }
 
   Polished out;
   out.candidate = settled;

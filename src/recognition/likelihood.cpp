@@ -52,9 +52,12 @@ Prediction predict(const SceneDepth& scene, const Part& part, Detail detail, con
 struct Predictions {
   std::vector<Prediction> of;
   int u0 = 0, v0 = 0, width = 0, height = 0, step_px = 1;
+  double inflation = 1;  ///< pixels closer than the noise's correlation tell the same story
 
   Predictions(const SceneDepth& scene, Detail detail, std::span<const std::pair<const Part*, Pose>> poses, int step)
-      : of(poses.size()), step_px(step) {
+      : of(poses.size()),
+        step_px(step),
+        inflation(std::max(1.0, correlation_inflation(scene.correlation_px) / (double(step) * step))) {
     parallel_each(static_cast<int>(poses.size()), [&](int i) {
       const auto k = static_cast<std::size_t>(i);
       of[k] = predict(scene, *poses[k].first, detail, poses[k].second, step);
@@ -111,14 +114,10 @@ double common_error_mm(const std::vector<double>& means, const std::vector<doubl
   return std::sqrt(std::max(0.0, sizes[sizes.size() / 2] / 0.455));
 }
 
-}  // namespace
-
-std::vector<double> log_likelihoods(const SceneDepth& scene, Detail detail,
-                                    std::span<const std::pair<const Part*, Pose>> poses, int step_px) {
+std::vector<double> likelihoods_of(const SceneDepth& scene, const Predictions& all) {
   // All poses are judged on the union of their windows: what one explains and another does not counts against the
   // other.
-  const Predictions all(scene, detail, poses, step_px);
-  std::vector<double> out(poses.size(), 0.0);
+  std::vector<double> out(all.of.size(), 0.0);
   Image<std::uint8_t> any(all.width, all.height, 0);
   for (const Prediction& p : all.of)
     for (int j = 0; j < p.height; ++j) {
@@ -128,7 +127,7 @@ std::vector<double> log_likelihoods(const SceneDepth& scene, Detail detail,
     }
   std::size_t judged = 0;
   for (const std::uint8_t a : any.data) judged += a;
-  parallel_each(static_cast<int>(poses.size()), [&](int which) {
+  parallel_each(static_cast<int>(all.of.size()), [&](int which) {
     // Where this pose says nothing but another does, all is unexplained.
     const Prediction& p = all.of[static_cast<std::size_t>(which)];
     double sum = kUnexplained * static_cast<double>(judged);
@@ -139,15 +138,21 @@ std::vector<double> log_likelihoods(const SceneDepth& scene, Detail detail,
     }
     out[static_cast<std::size_t>(which)] = -sum;
   });
-  // Pixels closer than the noise's correlation tell the same story.
-  const double inflation = std::max(1.0, correlation_inflation(scene.correlation_px) / (double(step_px) * step_px));
-  for (double& l : out) l /= inflation;
+  for (double& l : out) l /= all.inflation;
   return out;
 }
 
-std::vector<double> log_odds(const SceneDepth& scene, Detail detail,
-                             std::span<const std::pair<const Part*, Pose>> poses, int step_px,
-                             const CellMask& elsewhere) {
+/// Log of the odds of each pose against the first, from the pixels that tell the two apart: those where they predict
+/// places that differ by more than the noise and four times what errors common to whole faces amount to (estimated from
+/// the first pose's residuals, patch by patch). A patch of the image says at most so much: one that is measured wrongly
+/// must not outvote the others. Where no pixel tells, the odds are even: 0.
+/// \param order      indices into the predictions; odds are against the first.
+/// \param elsewhere  cells that other parts explain: they tell nothing.
+/// \return in that order; 0 for the first.
+/// \source ours: "the discriminating patches" of the design notes, section 9. Residuals on all pixels let the pose win
+///         that fits the sensor's smooth errors best: on simulated heaps a wrong pulley by 50 nats.
+std::vector<double> odds_of(const SceneDepth& scene, const Predictions& all, const std::vector<std::size_t>& order,
+                            const CellMask& elsewhere) {
   // Votes are counted by patches of the image: mirrored light, a burr, an edge a fraction of a pixel off move whole
   // patches, of either sign. So a patch counts at most 8 nats, and the sum counts beyond 1.5 sd of what the same votes
   // would sum to with random signs. Chosen on 148 comparisons of a true pose with its likeliest rival (32 simulated
@@ -155,13 +160,11 @@ std::vector<double> log_odds(const SceneDepth& scene, Detail detail,
   // and none of 14 over 3.
   constexpr int kPatch = 4;  // rendered pixels: one or two millimetres
   constexpr double kMostOfPatch = 8, kChance = 1.5;
-  std::vector<double> out(poses.size(), 0.0);
-  if (poses.size() < 2) return out;
-  const Predictions all(scene, detail, poses, step_px);
-  const double inflation = std::max(1.0, correlation_inflation(scene.correlation_px) / (double(step_px) * step_px));
+  std::vector<double> out(order.size(), 0.0);
+  if (order.size() < 2) return out;
   const int width = all.width, height = all.height;
   const int patches_x = (width + kPatch - 1) / kPatch, patches_y = (height + kPatch - 1) / kPatch;
-  const auto look = [&](std::size_t k, int i, int j) { return Look(all.of[k], i, j); };
+  const auto look = [&](std::size_t k, int i, int j) { return Look(all.of[order[k]], i, j); };
 
   // How far whole patches are off their surface in the likeliest pose.
   constexpr int kFace = 8;
@@ -180,11 +183,11 @@ std::vector<double> log_odds(const SceneDepth& scene, Detail detail,
         }
       if (n < kFace * kFace / 2) continue;
       means.push_back(sum / n);
-      variances.push_back(variance / n / n * inflation);
+      variances.push_back(variance / n / n * all.inflation);
     }
   const auto common = static_cast<float>(4 * common_error_mm(means, variances));
 
-  parallel_each(static_cast<int>(poses.size()) - 1, [&](int which) {
+  parallel_each(static_cast<int>(order.size()) - 1, [&](int which) {
     const auto k = static_cast<std::size_t>(which) + 1;
     // 1 where the two predict places that differ by more than noise and common errors.
     Image<std::uint8_t> tells(width, height, 0);
@@ -194,7 +197,7 @@ std::vector<double> log_odds(const SceneDepth& scene, Detail detail,
         const Look first = look(0, i, j), other = look(k, i, j);
         if (!first.any && !other.any) continue;
         if (elsewhere.count > 0) {
-          const int cu = (all.u0 + i * step_px) / scene.cell_px, cv = (all.v0 + j * step_px) / scene.cell_px;
+          const int cu = (all.u0 + i * all.step_px) / scene.cell_px, cv = (all.v0 + j * all.step_px) / scene.cell_px;
           if (elsewhere.holds(static_cast<std::size_t>(cv) * static_cast<std::size_t>(scene.cell_normal.width) +
                               static_cast<std::size_t>(cu)))
             continue;
@@ -216,7 +219,7 @@ std::vector<double> log_odds(const SceneDepth& scene, Detail detail,
       }
     double sum = 0, squares = 0;
     for (const double vote : votes) {
-      const double counted = std::clamp(vote / inflation, -kMostOfPatch, kMostOfPatch);
+      const double counted = std::clamp(vote / all.inflation, -kMostOfPatch, kMostOfPatch);
       sum += counted;
       squares += counted * counted;
     }
@@ -225,27 +228,21 @@ std::vector<double> log_odds(const SceneDepth& scene, Detail detail,
   return out;
 }
 
-namespace {
-
 void sort_by(const std::vector<double>& value, std::vector<std::size_t>& order) {
   std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return value[a] > value[b]; });
 }
 
-}  // namespace
-
-Ranking rank_again(const SceneDepth& scene, Detail detail, std::span<const std::pair<const Part*, Pose>> poses,
-                   int step_px, const CellMask& elsewhere) {
+/// \param order  the likeliest first.
+Ranking rank_by_odds(const SceneDepth& scene, const Predictions& all, std::vector<std::size_t> order,
+                     const CellMask& elsewhere) {
   Ranking out;
-  out.order.resize(poses.size());
-  std::iota(out.order.begin(), out.order.end(), std::size_t{0});
+  out.order = std::move(order);
   // Odds are taken against the leader. One nat does not depose it, and three poses may beat each other in a ring.
   constexpr double kMargin = 1;
   constexpr int kChanges = 3;
   for (int i = 0; i < kChanges; ++i) {
-    std::vector<std::pair<const Part*, Pose>> ordered;
-    for (const std::size_t k : out.order) ordered.push_back(poses[k]);
-    const std::vector<double> odds = log_odds(scene, detail, ordered, step_px, elsewhere);
-    std::vector<double> value(poses.size());
+    const std::vector<double> odds = odds_of(scene, all, out.order, elsewhere);
+    std::vector<double> value(odds.size());
     for (std::size_t k = 0; k < odds.size(); ++k) value[out.order[k]] = odds[k];
     const std::size_t leader = out.order[0];
     value[leader] = kMargin;
@@ -258,16 +255,30 @@ Ranking rank_again(const SceneDepth& scene, Detail detail, std::span<const std::
   return out;
 }
 
+std::vector<std::size_t> in_order(std::size_t n) {
+  std::vector<std::size_t> out(n);
+  std::iota(out.begin(), out.end(), std::size_t{0});
+  return out;
+}
+
+}  // namespace
+
+std::vector<double> log_likelihoods(const SceneDepth& scene, Detail detail,
+                                    std::span<const std::pair<const Part*, Pose>> poses, int step_px) {
+  return likelihoods_of(scene, Predictions(scene, detail, poses, step_px));
+}
+
+Ranking rank_again(const SceneDepth& scene, Detail detail, std::span<const std::pair<const Part*, Pose>> poses,
+                   int step_px, const CellMask& elsewhere) {
+  return rank_by_odds(scene, Predictions(scene, detail, poses, step_px), in_order(poses.size()), elsewhere);
+}
+
 Ranking rank_poses(const SceneDepth& scene, Detail detail, std::span<const std::pair<const Part*, Pose>> poses,
                    int step_px) {
-  std::vector<std::size_t> order(poses.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  sort_by(log_likelihoods(scene, detail, poses, step_px), order);
-  std::vector<std::pair<const Part*, Pose>> ordered;
-  for (const std::size_t k : order) ordered.push_back(poses[k]);
-  Ranking out = rank_again(scene, detail, ordered, step_px, {});
-  for (std::size_t& k : out.order) k = order[k];
-  return out;
+  const Predictions all(scene, detail, poses, step_px);
+  std::vector<std::size_t> order = in_order(poses.size());
+  sort_by(likelihoods_of(scene, all), order);
+  return rank_by_odds(scene, all, std::move(order), {});
 }
 
 }  // namespace tribin

@@ -19,68 +19,6 @@ Pose turned(const Pose& pose, const ContinuousSymmetry& line, double angle) {
   return pose * turn;
 }
 
-/// Spins about the axes that the part is nearly round about: the best rendered poses over the whole turn. A search on
-/// the likelihood, because ICP slides past the small features that decide. (The view's points instead of renders rank
-/// the right spin behind the eighth in 15 % of the cases, renders in 2 %.)
-void add_spins(const SceneDepth& scene, const Part& part, const Pose& pose, std::vector<Pose>& out) {
-  constexpr int kSpins = 120;  // 3 deg: a hole of 5 % of the diameter at its rim
-  constexpr std::size_t kBest = 8, kMost = 24;
-  constexpr std::size_t kLooked = 24;  // maxima on few pixels that are looked at again on more
-  const int few = step_for(part, scene, pose, kCompareFew), step = step_for(part, scene, pose, kPolishPixels);
-  for (const ContinuousSymmetry& axis : part.nearly_round) {
-    std::vector<Pose> spins;
-    for (int k = 0; k < kSpins; ++k) spins.push_back(turned(pose, axis, 2 * kPi * k / kSpins));
-    std::vector<double> score = render_scores(scene, part, Detail::coarse, spins, few);
-    std::vector<int> maxima;
-    for (int k = 1; k < kSpins; ++k) {
-      const auto at = [&](int i) { return score[static_cast<std::size_t>((i + kSpins) % kSpins)]; };
-      if (at(k) >= at(k - 1) && at(k) > at(k + 1)) maxima.push_back(k);
-    }
-    const auto best_first = [&] {
-      std::stable_sort(maxima.begin(), maxima.end(), [&](int a, int b) {
-        return score[static_cast<std::size_t>(a)] > score[static_cast<std::size_t>(b)];
-      });
-    };
-    best_first();
-    if (maxima.size() > kLooked) maxima.resize(kLooked);
-    if (step < few) {
-      std::vector<Pose> looked;
-      for (const int k : maxima) looked.push_back(spins[static_cast<std::size_t>(k)]);
-      const std::vector<double> finer = render_scores(scene, part, Detail::full, looked, step);
-      for (std::size_t i = 0; i < maxima.size(); ++i) score[static_cast<std::size_t>(maxima[i])] = finer[i];
-      best_first();
-    }
-    // Where the scan hardly tells the spins apart, all of them are alternatives.
-    std::size_t keep = std::min(kBest, maxima.size());
-    while (keep < std::min(kMost, maxima.size()) &&
-           score[static_cast<std::size_t>(maxima[keep])] > score[static_cast<std::size_t>(maxima[0])] - kUndecided)
-      ++keep;
-    // Refinement hardly turns what is nearly round: the spins are brought to their best by halves of the step.
-    std::vector<double> angle(keep), best(keep);
-    for (std::size_t i = 0; i < keep; ++i) {
-      angle[i] = 2 * kPi * maxima[i] / kSpins;
-      best[i] = score[static_cast<std::size_t>(maxima[i])];
-    }
-    constexpr int kHalvings = 3;  // to 0.4 deg
-    for (int h = 0; h < kHalvings; ++h) {
-      const double turn = kPi / kSpins / (1 << h);
-      std::vector<double> tried;
-      std::vector<Pose> beside;
-      for (std::size_t i = 0; i < 2 * keep; ++i) {
-        tried.push_back(angle[i / 2] + (i % 2 ? turn : -turn));
-        beside.push_back(turned(pose, axis, tried.back()));
-      }
-      const std::vector<double> there = render_scores(scene, part, Detail::coarse, beside, std::min(step, few));
-      for (std::size_t i = 0; i < 2 * keep; ++i)
-        if (there[i] > best[i / 2]) {
-          best[i / 2] = there[i];
-          angle[i / 2] = tried[i];
-        }
-    }
-    for (std::size_t i = 0; i < keep; ++i) out.push_back(turned(pose, axis, angle[i]));
-  }
-}
-
 /// Half turns about the faces that most of what is seen belongs to: about the middle of a plane, end for end of a
 /// cylinder. They bring a face onto itself, or nearly, and what would tell may be hidden.
 void add_half_turns(const SceneDepth& scene, const Part& part, const Pose& pose, std::vector<Pose>& out) {
@@ -117,6 +55,69 @@ void add_half_turns(const SceneDepth& scene, const Part& part, const Pose& pose,
 
 }  // namespace
 
+// A search on the likelihood, because ICP slides past the small features that decide. (The view's points instead of
+// renders rank the right spin behind the eighth in 15 % of the cases, renders in 2 %.)
+std::vector<Pose> spins(const SceneDepth& scene, const Part& part, const Pose& pose) {
+  std::vector<Pose> out;
+  constexpr int kSpins = 120;  // 3 deg: a hole of 5 % of the diameter at its rim
+  constexpr std::size_t kBest = 8, kMost = 24;
+  constexpr std::size_t kLooked = 24;  // maxima on few pixels that are looked at again on more
+  const int few = step_for(part, scene, pose, kCompareFew), step = step_for(part, scene, pose, kPolishPixels);
+  for (const ContinuousSymmetry& axis : part.nearly_round) {
+    std::vector<Pose> turns;
+    for (int k = 0; k < kSpins; ++k) turns.push_back(turned(pose, axis, 2 * kPi * k / kSpins));
+    std::vector<double> score = render_scores(scene, part, Detail::coarse, turns, few);
+    std::vector<int> maxima;
+    for (int k = 1; k < kSpins; ++k) {
+      const auto at = [&](int i) { return score[static_cast<std::size_t>((i + kSpins) % kSpins)]; };
+      if (at(k) >= at(k - 1) && at(k) > at(k + 1)) maxima.push_back(k);
+    }
+    const auto best_first = [&] {
+      std::stable_sort(maxima.begin(), maxima.end(), [&](int a, int b) {
+        return score[static_cast<std::size_t>(a)] > score[static_cast<std::size_t>(b)];
+      });
+    };
+    best_first();
+    if (maxima.size() > kLooked) maxima.resize(kLooked);
+    if (step < few) {
+      std::vector<Pose> looked;
+      for (const int k : maxima) looked.push_back(turns[static_cast<std::size_t>(k)]);
+      const std::vector<double> finer = render_scores(scene, part, Detail::full, looked, step);
+      for (std::size_t i = 0; i < maxima.size(); ++i) score[static_cast<std::size_t>(maxima[i])] = finer[i];
+      best_first();
+    }
+    // Where the scan hardly tells the spins apart, all of them are alternatives.
+    std::size_t keep = std::min(kBest, maxima.size());
+    while (keep < std::min(kMost, maxima.size()) &&
+           score[static_cast<std::size_t>(maxima[keep])] > score[static_cast<std::size_t>(maxima[0])] - kUndecided)
+      ++keep;
+    // Refinement hardly turns what is nearly round: the spins are brought to their best by halves of the step.
+    std::vector<double> angle(keep), best(keep);
+    for (std::size_t i = 0; i < keep; ++i) {
+      angle[i] = 2 * kPi * maxima[i] / kSpins;
+      best[i] = score[static_cast<std::size_t>(maxima[i])];
+    }
+    constexpr int kHalvings = 3;  // to 0.4 deg
+    for (int h = 0; h < kHalvings; ++h) {
+      const double turn = kPi / kSpins / (1 << h);
+      std::vector<double> tried;
+      std::vector<Pose> beside;
+      for (std::size_t i = 0; i < 2 * keep; ++i) {
+        tried.push_back(angle[i / 2] + (i % 2 ? turn : -turn));
+        beside.push_back(turned(pose, axis, tried.back()));
+      }
+      const std::vector<double> there = render_scores(scene, part, Detail::coarse, beside, std::min(step, few));
+      for (std::size_t i = 0; i < 2 * keep; ++i)
+        if (there[i] > best[i / 2]) {
+          best[i / 2] = there[i];
+          angle[i / 2] = tried[i];
+        }
+    }
+    for (std::size_t i = 0; i < keep; ++i) out.push_back(turned(pose, axis, angle[i]));
+  }
+  return out;
+}
+
 std::vector<Pose> rivals(const SceneDepth& scene, const Part& part, const Pose& pose) {
   std::vector<Pose> out;
   const auto score = [&](const Pose& p, double tolerance) {
@@ -128,7 +129,6 @@ std::vector<Pose> rivals(const SceneDepth& scene, const Part& part, const Pose& 
   const double near = 0.02 * part.diameter_mm, own = score(pose, near);
   for (const SelfSimilarPose& s : part.self_similar)
     if (const Pose other = pose * s.part_from_part; score(other, near) > own - kBehind) out.push_back(other);
-  add_spins(scene, part, pose, out);
   // Half turns bring a face onto itself but nearly.
   std::vector<Pose> halves;
   add_half_turns(scene, part, pose, halves);

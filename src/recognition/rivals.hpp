@@ -12,9 +12,12 @@ inline constexpr double kCompareFew = 1000;  // and those that all its rivals ar
 // Poses that a comparison leaves within so many nats are compared again on all pixels.
 inline constexpr double kUndecided = 30;
 
-/// Poses that the part's own shape confuses with this one: self-similar ones, spins about axes that it is nearly round
-/// about, half turns about the faces that are seen.
+/// Poses that the part's own shape confuses with this one: self-similar ones, half turns about the faces that are seen.
 std::vector<Pose> rivals(const SceneDepth& scene, const Part& part, const Pose& pose);
+
+/// Spins about the axes that the part is nearly round about: the best rendered poses over the whole turn, each brought
+/// to its best angle.
+std::vector<Pose> spins(const SceneDepth& scene, const Part& part, const Pose& pose);
 
 /// The pose moved to both sides along the direction that its information holds least: slots and steps make local minima
 /// there that refinement does not leave.
