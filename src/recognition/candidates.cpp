@@ -267,17 +267,25 @@ std::vector<PoseCandidate> sift(const SceneDepth& scene, const Part& part, int p
 }  // namespace
 
 std::vector<PoseCandidate> find_candidates(const SceneFeatures& features, SceneDepth& scene, const Part& part,
-                                           int part_index, Source source, std::vector<Reason>& rejected) {
+                                           int part_index, Source source, PartSearch& search,
+                                           std::vector<Reason>& rejected) {
   scene.background = background_cells(features, part);
   std::vector<Pose> poses;
   if (source == Source::primitives) {
     hypotheses_from_pairs(features, part, poses);
     hypotheses_from_cylinders(features, part, poses);
     hypotheses_from_planes(features, part, poses);
-    return sift(scene, part, part_index, poses, false, rejected);
+  } else {
+    if (!search.pairs) search.pairs.emplace(part.sample_points, part.sample_normals, part.diameter_mm);
+    hypotheses_from_point_pairs(features, part, *search.pairs, poses);
   }
-  hypotheses_from_point_pairs(features, part, poses);
-  return sift(scene, part, part_index, poses, true, rejected);
+  // What lies within half a diameter of a pose's middle is looked at, and a quarter around it others compete for
+  // places.
+  if (features.fresh)
+    std::erase_if(poses, [&](const Pose& pose) {
+      return !features.changed_near((pose * part.box_center()).cast<float>(), part.diameter_mm);
+    });
+  return sift(scene, part, part_index, poses, source == Source::point_pairs, rejected);
 }
 
 }  // namespace tribin

@@ -4,6 +4,7 @@
 
 #include "detail.hpp"
 #include "hypotheses.hpp"
+#include "point_pairs.hpp"
 #include "tribin/core/reason.hpp"
 #include "tribin/pose/refine.hpp"
 #include "tribin/pose/verification.hpp"
@@ -46,10 +47,16 @@ Refinement refine_guarded(const Part& part, Detail detail, const SceneDepth& sce
 /// Where hypotheses come from, cheapest and surest first.
 enum class Source { primitives, point_pairs };
 
+/// What searches for one part share.
+struct PartSearch {
+  std::optional<PointPairTable> pairs;  ///< made when first wanted: some 10 ms
+};
+
 /// The candidates of one part in what is not explained yet, best evidence first.
 /// \param scene  its `background` is set for this part.
 std::vector<PoseCandidate> find_candidates(const SceneFeatures& features, SceneDepth& scene, const Part& part,
-                                           int part_index, Source source, std::vector<Reason>& rejected);
+                                           int part_index, Source source, PartSearch& search,
+                                           std::vector<Reason>& rejected);
 
 /// Do two poses of one part mean the same placing, its symmetries aside?
 /// \param distance_mm, angle  how far the centre of its box may be off, and how far it may be turned.

@@ -48,9 +48,8 @@ void rank(const SceneDepth& scene, const Part& part, Detail detail, int step, st
 
 /// Only those that are near the first.
 void drop_unlikely(double behind, std::vector<Finalist>& finalists) {
-  std::erase_if(finalists, [least = finalists[0].log_likelihood - behind](const Finalist& f) {
-    return f.log_likelihood < least;
-  });
+  std::erase_if(finalists,
+                [least = finalists[0].log_likelihood - behind](const Finalist& f) { return f.log_likelihood < least; });
 }
 
 constexpr std::ptrdiff_t kEven = 8;
@@ -196,8 +195,8 @@ Polished polish_once(const SceneDepth& scene, std::span<const Part> parts, const
   // 70 polishes of nearly round parts).
   drop_unlikely(kUndecided - 0.25 * finalists[0].log_likelihood, finalists);
 
-  // Fine: the survivors on more pixels. Where many stay even as they are, no fit of each would tell them apart. Else they
-  // are fitted, and those that stay near the best are compared once more on all pixels.
+  // Fine: the survivors on more pixels. Where many stay even as they are, no fit of each would tell them apart. Else
+  // they are fitted, and those that stay near the best are compared once more on all pixels.
   const int fine = step_for(part, scene, settled.camera_from_part, kPolishPixels);
   if (finalists.size() >= kEven) {
     rank(scene, part, Detail::full, fine, finalists);

@@ -37,6 +37,23 @@ void claim_cells(SceneFeatures& scene, const CellMask& mask) {
   });
 }
 
+bool SceneFeatures::changed_near(const Vec3f& point, double reach_mm) const {
+  const auto square = static_cast<float>(reach_mm * reach_mm);
+  return !fresh ||
+         std::any_of(fresh->begin(), fresh->end(), [&](const Vec3f& p) { return (p - point).squaredNorm() < square; });
+}
+
+std::vector<Vec3f> points_of(const CellMask& mask, const Surfels& surfels) {
+  constexpr int kEvery = 4;
+  const Image<std::int32_t>& grid = surfels.surfel_of_cell;
+  std::vector<Vec3f> out;
+  for (int j = 0; j < grid.height; j += kEvery)
+    for (int i = 0; i < grid.width; i += kEvery)
+      if (mask.holds(grid.index(i, j)) && grid(i, j) >= 0)
+        out.push_back(surfels.position[static_cast<std::size_t>(grid(i, j))]);
+  return out;
+}
+
 std::vector<PartFeature> visible_features(const Part& part, PrimitiveType type, std::size_t most) {
   std::vector<PartFeature> out;
   double total = 0;

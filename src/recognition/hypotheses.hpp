@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -15,6 +16,7 @@
 namespace tribin {
 
 struct BinSighting;
+class PointPairTable;
 
 /// A scene primitive with what the generators need to know of it.
 struct SceneFeature {
@@ -29,10 +31,19 @@ struct SceneFeatures {
   const Surfels* surfels = nullptr;
   const Primitives* primitives = nullptr;
   CellMask claimed;  ///< cells that an accepted instance explains
+  /// Points that were explained since the same search was made last, thinned; none = it is made for the first time, and
+  /// looks everywhere. Elsewhere it would end as it did.
+  std::optional<std::vector<Vec3f>> fresh;
+
+  /// May a search end otherwise here than it did last? \param reach_mm  how far what it looks at lies away.
+  bool changed_near(const Vec3f& point, double reach_mm) const;
 };
 
 /// Marks cells as explained and drops the features that lie in them.
 void claim_cells(SceneFeatures& scene, const CellMask& mask);
+
+/// Where the cells lie: every fourth of them in both directions.
+std::vector<Vec3f> points_of(const CellMask& mask, const Surfels& surfels);
 
 SceneFeatures make_scene_features(const Primitives& primitives, const PrimitiveModel& observation,
                                   const Surfels& surfels);
@@ -63,7 +74,8 @@ void hypotheses_from_pairs(const SceneFeatures& scene, const Part& part, std::ve
 /// Pairs of oriented points of what nothing explains vote for where the part's own pairs lie alike: for parts and views
 /// without handy primitives.
 /// \source B. Drost, M. Ulrich, N. Navab, S. Ilic, "Model globally, match locally", CVPR 2010, on surfels.
-void hypotheses_from_point_pairs(const SceneFeatures& scene, const Part& part, std::vector<Pose>& out);
+void hypotheses_from_point_pairs(const SceneFeatures& scene, const Part& part, const PointPairTable& table,
+                                 std::vector<Pose>& out);
 
 /// The surfels of connected pieces of the scan that neither the background nor an accepted instance explains and that
 /// are large enough to be a piece of the part. Empty = nothing is left that could be one.

@@ -45,11 +45,11 @@ Pose pose_of(const Vec3f& part_point, const Vec3f& part_normal, const Vec3f& sce
 
 }  // namespace
 
-void hypotheses_from_point_pairs(const SceneFeatures& scene, const Part& part, std::vector<Pose>& out) {
+void hypotheses_from_point_pairs(const SceneFeatures& scene, const Part& part, const PointPairTable& table,
+                                 std::vector<Pose>& out) {
   const double spacing = 0.05 * part.diameter_mm;
   const OrientedPoints seen = unexplained_points(scene, part, spacing);
   if (seen.points.size() < 8) return;
-  const PointPairTable table(part.sample_points, part.sample_normals, part.diameter_mm);
   const std::size_t cells = part.sample_points.size() * kTurns;
   const auto reach = static_cast<float>(part.diameter_mm * part.diameter_mm);
 
@@ -59,6 +59,7 @@ void hypotheses_from_point_pairs(const SceneFeatures& scene, const Part& part, s
     std::vector<std::uint16_t> votes(cells);
     for (int k = begin; k < end; ++k) {
       const std::size_t r = static_cast<std::size_t>(k) * kEvery;
+      if (!scene.changed_near(seen.points[r], 1.1 * part.diameter_mm)) continue;  // it votes as it did
       Vec3 ud, vd;
       orthonormal_basis(seen.normals[r].cast<double>(), ud, vd);
       const Vec3f u = ud.cast<float>(), v = vd.cast<float>();

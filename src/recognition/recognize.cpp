@@ -192,24 +192,29 @@ Instances recognize(const Primitives& primitives, const PrimitiveModel& observat
   Refused refused;
   Standing stands;
   std::vector<Polished> found;
+  std::vector<PartSearch> searches(parts.size());
   // Rounds on what is left: primitives first, as long as they lead to parts; then pairs of points.
   for (const Source source : {Source::primitives, Source::point_pairs}) {
+    features.fresh.reset();
     constexpr int kRounds = 8;  // each round takes at least one part of those that touch or hide each other
     for (int round = 0; round < kRounds; ++round) {
       if (budget.exhausted()) break;
       std::vector<PoseCandidate> candidates;
       for (std::size_t i = 0; i < parts.size() && budget.take(); ++i) {
         const std::vector<PoseCandidate> of_part =
-            find_candidates(features, scene, parts[i], static_cast<int>(i), source, out.rejected);
+            find_candidates(features, scene, parts[i], static_cast<int>(i), source, searches[i], out.rejected);
         candidates.insert(candidates.end(), of_part.begin(), of_part.end());
       }
       std::vector<Polished> winners =
           choose_winners(features, scene, parts, std::move(candidates), stands, refused, budget, out.rejected);
+      CellMask fresh;
       for (Polished& w : winners) {
         claim_cells(features, w.mask);
+        fresh.join(w.mask);
         found.push_back(std::move(w));
       }
       if (winners.empty()) break;
+      features.fresh = points_of(fresh, surfels);
     }
   }
   out.time_limit = budget.exhausted();
