@@ -15,6 +15,7 @@
 #include "tribin/io/cad_files.hpp"
 #include "tribin/io/part_cache.hpp"
 #include "tribin/io/scan_files.hpp"
+#include "tribin/part/symmetry.hpp"
 #include "tribin/surfel/pixel_normals.hpp"
 
 namespace tribin::cli {
@@ -56,6 +57,7 @@ Stock stock_of(const fs::path& dataset, const fs::path& scratch) {
     options.name = object.name;
     options.cache = part_cache_folder();
     stock.parts.push_back(read_part(object.file, options));
+    declare_symmetry(stock.parts.back(), object.symmetry);
     stock.points.push_back(scratch / ("model_" + std::to_string(object.id)));
     peer::write_raw(stock.points.back().string(), oriented_points(stock.parts.back().mesh));
   }

@@ -13,6 +13,7 @@
 #include "tribin/core/log.hpp"
 #include "tribin/finder/finder.hpp"
 #include "tribin/io/part_cache.hpp"
+#include "tribin/part/symmetry.hpp"
 #include "tribin/report/bop_results.hpp"
 
 namespace tribin::cli {
@@ -87,6 +88,8 @@ std::string recipe_of(const Options& options, const std::vector<eval::BopObject>
       {"bin", options.bin.empty() ? "" : hex_of(content_hash(bytes_of(options.bin)))},
       {"times", !options.no_times},
       {"targets", options.targets.empty() ? "" : hex_of(content_hash(bytes_of(options.targets)))}};
+  const fs::path infos = fs::path(options.dataset) / options.models / "models_info.json";
+  if (fs::exists(infos)) recipe["models_info"] = hex_of(content_hash(bytes_of(infos)));
   for (const eval::BopObject& object : objects)
     recipe["objects"].push_back(
         {{"obj_id", object.id}, {"part", object.name}, {"hash", hex_of(content_hash(bytes_of(object.file)))}});
@@ -118,7 +121,9 @@ class OfferedParts {
     PartReadOptions options;
     options.name = object.name;
     options.cache = cache_;
-    return read_part(object.file, options);
+    Part part = read_part(object.file, options);
+    declare_symmetry(part, object.symmetry);
+    return part;
   }
 
   std::vector<eval::BopObject> objects_;

@@ -4,6 +4,7 @@
 #include "tribin/core/error.hpp"
 #include "tribin/core/log.hpp"
 #include "tribin/io/cad_files.hpp"
+#include "tribin/part/symmetry.hpp"
 
 namespace tribin::cli {
 
@@ -16,7 +17,10 @@ WorkCell read_work_cell_logged(const std::filesystem::path& file) {
 std::vector<Part> read_parts_of(const WorkCell& cell, bool no_cache) {
   std::vector<Part> out;
   for (const CellPart& part : cell.parts)
-    for (Part& read : read_parts({{part.name, part.cad}}, part.unit, no_cache)) out.push_back(std::move(read));
+    for (Part& read : read_parts({{part.name, part.cad}}, part.unit, no_cache)) {
+      if (part.free_spin) declare_free_spin(read);
+      out.push_back(std::move(read));
+    }
   return out;
 }
 

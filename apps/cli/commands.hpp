@@ -71,6 +71,11 @@ void add_any_scan(CLI::App* command, std::string& scan, std::string& camera, std
 /// --no-cache, for commands that compile parts.
 void add_no_cache(CLI::App* command, bool& no_cache);
 
+/// --free-spin, for commands that look for parts.
+void add_free_spin(CLI::App* command, std::vector<std::string>& names);
+/// Declares it of the parts of these names. \throws Error bad_option for a name that no part has.
+void declare_free_spins(const std::vector<std::string>& names, std::vector<Part>& parts);
+
 /// Reads the parts and compiles those that the cache does not hold; their warnings go to the log.
 std::vector<Part> read_parts(const std::vector<PartArgument>& arguments, const std::string& unit,
                              bool no_cache = false);

@@ -1,9 +1,11 @@
+#include <algorithm>
 #include <set>
 
 #include "commands.hpp"
 #include "tribin/core/error.hpp"
 #include "tribin/core/log.hpp"
 #include "tribin/io/part_cache.hpp"
+#include "tribin/part/symmetry.hpp"
 
 namespace tribin::cli {
 
@@ -65,6 +67,24 @@ void add_any_scan(CLI::App* command, std::string& scan, std::string& camera, std
 
 void add_no_cache(CLI::App* command, bool& no_cache) {
   command->add_flag("--no-cache", no_cache, "Compile the CAD anew: no kept part is used, and none is kept");
+}
+
+void add_free_spin(CLI::App* command, std::vector<std::string>& names) {
+  command
+      ->add_option(
+          "--free-spin", names,
+          "Name of a part whose turn about its nearly round axis makes no difference, a toothed wheel for one; "
+          "repeat it for more")
+      ->type_name("NAME")
+      ->allow_extra_args(false);
+}
+
+void declare_free_spins(const std::vector<std::string>& names, std::vector<Part>& parts) {
+  for (const std::string& name : names) {
+    const auto part = std::find_if(parts.begin(), parts.end(), [&](const Part& p) { return p.name == name; });
+    if (part == parts.end()) throw Error(ErrorCode::bad_option, "--free-spin " + name + ": no --part has that name");
+    declare_free_spin(*part);
+  }
 }
 
 std::vector<Part> read_parts(const std::vector<PartArgument>& arguments, const std::string& unit, bool no_cache) {

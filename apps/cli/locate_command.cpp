@@ -19,7 +19,7 @@ namespace {
 
 struct Options {
   std::string scan, camera, bin, json, report, figures, truth, unit = "mm", scan_unit = "auto", method = "surfel";
-  std::vector<std::string> parts;
+  std::vector<std::string> parts, free_spin;
   double tolerance_mm = 0, tolerance_deg = 0;
   int time_limit_ms = 0;
   bool no_times = false, no_cache = false;
@@ -119,7 +119,8 @@ int run(Options options, const Context& context) {
     const StageTimer timer(reading, "read");
     scan = read_scan_logged(options.scan, options.camera, options.scan_unit);
   }
-  const std::vector<Part> parts = read_parts(arguments, options.unit, options.no_cache);
+  std::vector<Part> parts = read_parts(arguments, options.unit, options.no_cache);
+  declare_free_spins(options.free_spin, parts);
   std::optional<ReportTruth> truth;
   if (!options.truth.empty()) truth = read_truth(options);
 
@@ -165,6 +166,7 @@ void add_locate(CLI::App& app, Context& context) {
       ->required()
       ->type_name("[NAME=]CAD")
       ->allow_extra_args(false);
+  add_free_spin(command, options->free_spin);
   command->add_option("--camera", options->camera, "Camera file of a depth image (camera.json, BOP scene_camera.json)")
       ->type_name("FILE");
   command

@@ -184,6 +184,8 @@ Fields<CellPart> part_fields() {
   fields.number("mass_kg", "kg", {0, 1000}, &CellPart::mass_kg, "0 = not known");
   fields.texts("grippers", &CellPart::grippers, "names of the grippers that may hold it");
   fields.number("max_tilt_deg", "deg", {0, 180}, &CellPart::max_tilt_rad, "of the approach to the vertical", kDegree);
+  fields.flag("free_spin", &CellPart::free_spin,
+              "its turn about its nearly round axis makes no difference, as of a toothed wheel");
   fields.list("pick_points", pick_point_fields(), &CellPart::pick_points,
               "where to grip; none: grasps are found from its surfaces");
   add_pose(fields, "slot_from_part", &CellPart::slot_from_part, "how it stands in a slot, and at the station");

@@ -84,7 +84,12 @@ std::vector<BopObject> list_bop_objects(const fs::path& models_dir) {
     const int id = number_of(stem.substr(4));
     if (id < 0) continue;
     const std::string key = std::to_string(id);
-    out.push_back({id, infos.contains(key) ? bop_object_name(infos.at(key), id) : stem, entry.path()});
+    const Json info = infos.contains(key) ? infos.at(key) : Json::object();
+    try {
+      out.push_back({id, bop_object_name(info, id), entry.path(), bop_symmetry(info)});
+    } catch (const Json::exception& e) {
+      throw Error(ErrorCode::bad_input, info_path.string() + ", object " + key + ": " + e.what());
+    }
   }
   if (out.empty())
     throw Error(ErrorCode::bad_input, models_dir.string() + ": saw no obj_*.ply; wanted the models of a BOP data set");

@@ -18,20 +18,6 @@ Pose pose_of(const Json& rotation, const Json& translation) {
   return out;
 }
 
-/// A row-wise 4 x 4 matrix.
-Pose pose_of_rows(const Json& rows) {
-  Pose out = Pose::Identity();
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) out.linear()(i, j) = rows.at(4 * i + j).get<double>();
-    out.translation()[i] = rows.at(4 * i + 3).get<double>();
-  }
-  return out;
-}
-
-Vec3 vector_of(const Json& values) {
-  return {values.at(0).get<double>(), values.at(1).get<double>(), values.at(2).get<double>()};
-}
-
 }  // namespace
 
 std::vector<Model> read_bop_models(const std::filesystem::path& models_dir) {
@@ -50,14 +36,9 @@ std::vector<Model> read_bop_models(const std::filesystem::path& models_dir) {
       model.diameter_mm = info.at("diameter");
       const Vec3 low(info.at("min_x"), info.at("min_y"), info.at("min_z"));
       model.box_center = low + 0.5 * Vec3(info.at("size_x"), info.at("size_y"), info.at("size_z"));
-      model.symmetry.discrete.push_back(Pose::Identity());
-      if (info.contains("symmetries_discrete"))
-        for (const Json& rows : info["symmetries_discrete"]) model.symmetry.discrete.push_back(pose_of_rows(rows));
+      model.symmetry = bop_symmetry(info);
       if (info.contains("near_symmetries_discrete"))
         for (const Json& rows : info["near_symmetries_discrete"]) model.near_symmetries.push_back(pose_of_rows(rows));
-      if (info.contains("symmetries_continuous"))
-        for (const Json& s : info["symmetries_continuous"])
-          model.symmetry.continuous.push_back({vector_of(s.at("axis")), vector_of(s.at("offset"))});
       models.emplace_back(id, std::move(model));
     }
   } catch (const std::logic_error& e) {

@@ -6,6 +6,7 @@
 
 #include "tribin/core/error.hpp"
 #include "tribin/finder/finder.hpp"
+#include "tribin/part/symmetry.hpp"
 #include "tribin/picking/place.hpp"
 
 namespace tribin::picking {
@@ -157,15 +158,16 @@ const robot::Arm& arm_of(const WorkCell& cell, const robot::RobotModel& robot, s
 
 std::vector<Pose> alike(const Part& part, const Pose& pose) {
   std::vector<Pose> out;
+  const SymmetryGroup group = all_symmetries(part);
   const auto add = [&](const Pose& turn) {
-    for (const Pose& same : part.symmetry.discrete) out.push_back(pose * turn * same);
-    if (part.symmetry.discrete.empty()) out.push_back(pose * turn);
+    for (const Pose& same : group.discrete) out.push_back(pose * turn * same);
+    if (group.discrete.empty()) out.push_back(pose * turn);
   };
-  if (part.symmetry.continuous.empty()) {
+  if (group.continuous.empty()) {
     add(Pose::Identity());
     return out;
   }
-  const ContinuousSymmetry& axis = part.symmetry.continuous.front();
+  const ContinuousSymmetry& axis = group.continuous.front();
   for (int k = 0; k < kTurns; ++k) {
     Pose turn = Pose::Identity();
     turn.linear() = rotation_from_vector(2 * kPi * k / kTurns * axis.axis);

@@ -7,6 +7,7 @@
 
 #include "render_scores.hpp"
 #include "tribin/core/parallel.hpp"
+#include "tribin/part/symmetry.hpp"
 #include "tribin/pose/look_up.hpp"
 
 namespace tribin {
@@ -114,22 +115,7 @@ const PartView& view_of(const Part& part, const Pose& camera_from_part) {
 }
 
 bool close_poses(const Part& part, const Pose& a, const Pose& b, double distance_mm, double angle) {
-  const Eigen::Vector3d c = part.box_center();
-  const auto near = [&](const Eigen::Vector3d& point, const Pose& other) {
-    return (a * point - other * point).squaredNorm() < distance_mm * distance_mm;
-  };
-  const std::vector<ContinuousSymmetry>& round = part.symmetry.continuous;
-  const auto close = [&](const Pose& other) {
-    if (round.empty()) return near(c, other) && rotation_angle(a.linear(), other.linear()) < angle;
-    const Eigen::Vector3d axis = Eigen::Vector3d(round[0].axis).normalized(), point = round[0].point;
-    if (round.size() > 1) return near(point, other);  // a ball
-    const double cosine = (a.linear() * axis).dot(other.linear() * axis);
-    return near(point + axis * axis.dot(c - point), other) && cosine > std::cos(angle);
-  };
-  if (close(b)) return true;
-  for (std::size_t i = 1; i < part.symmetry.discrete.size(); ++i)  // the identity comes first
-    if (close(b * part.symmetry.discrete[i])) return true;
-  return false;
+  return same_placing(part, part.symmetry, a, b, distance_mm, angle);
 }
 
 double covered_pixels(const Part& part, const SceneDepth& scene, const Pose& camera_from_part) {

@@ -8,6 +8,7 @@
 #include "selection.hpp"
 #include "tribin/core/error.hpp"
 #include "tribin/core/parallel.hpp"
+#include "tribin/part/symmetry.hpp"
 #include "tribin/pose/index_render.hpp"
 #include "tribin/pose/systematic_error.hpp"
 #include "tribin/recognition/bin.hpp"
@@ -56,6 +57,13 @@ double share_of_first(const Instance& instance) {
   return share;
 }
 
+/// An answer, and what speaks for it.
+struct Answer {
+  Instance instance;
+  double place = 0;  ///< probability that class and place are right, whichever pose it is in there
+  double held = 0;   ///< probability that the noise leaves the pose within what counts as found
+};
+
 /// The last word on a pose, and what its residuals tell of errors that pixels have in common.
 struct LastWord {
   Refinement refined;
@@ -96,10 +104,11 @@ double common_variance(std::span<const LastWord> all) {
 }
 
 /// \param shared_mm2  common_variance of the scan.
-Instance make_instance(const Polished& p, const LastWord& last, double shared_mm2, std::span<const Part> parts,
-                       const RecognitionOptions& recognition) {
+Answer make_answer(const Polished& p, const LastWord& last, double shared_mm2, std::span<const Part> parts,
+                   const RecognitionOptions& recognition) {
   const Part& part = parts[static_cast<std::size_t>(p.candidate.part)];
-  Instance out;
+  Answer answer;
+  Instance& out = answer.instance;
   out.part = part.name;
   out.camera_from_part = last.refined.camera_from_part;
   // The scan's mean counts as much as a dozen of the part's own patches, and patches of like normals share what they
@@ -109,10 +118,21 @@ Instance make_instance(const Polished& p, const LastWord& last, double shared_mm
   const Matrix6 field = pull_of_field(last.errors.patches, variance, kCorrelation * part.diameter_mm);
   describe_uncertainty(part, Matrix6(field + last.errors.systematic), last.refined, out);
 
-  // Self-similar poses: those that keep 1 % are told.
-  double sum = 1;
-  for (const auto& [pose, log_odds] : p.others) sum += std::exp(log_odds);
+  // Self-similar poses: those that keep 1 % are told. Of those that nobody tells apart the likeliest stands for all:
+  // how many were tried says nothing.
+  const SymmetryGroup same = all_symmetries(part);
+  std::vector<std::pair<Pose, double>> apart;
   for (const auto& [pose, log_odds] : p.others) {
+    const auto is = [&, &tried = pose](const Pose& other) {
+      return same_placing(part, same, other, tried, 0.02 * part.diameter_mm, 4 * kDegree);
+    };
+    if (!is(out.camera_from_part) &&
+        std::none_of(apart.begin(), apart.end(), [&](const auto& a) { return is(a.first); }))
+      apart.emplace_back(pose, log_odds);
+  }
+  double sum = 1;
+  for (const auto& [pose, log_odds] : apart) sum += std::exp(log_odds);
+  for (const auto& [pose, log_odds] : apart) {
     const double probability = std::exp(log_odds) / sum;
     if (probability < 0.01) continue;
     Alternative a;
@@ -121,22 +141,22 @@ Instance make_instance(const Polished& p, const LastWord& last, double shared_mm
     a.decided_by = "the surface where the two poses differ";
     out.alternatives.push_back(a);
   }
-  for (std::size_t i = 1; i < part.symmetry.discrete.size(); ++i)
-    out.equivalent_poses.push_back(out.camera_from_part * part.symmetry.discrete[i]);
+  for (std::size_t i = 1; i < same.discrete.size(); ++i)
+    out.equivalent_poses.push_back(out.camera_from_part * same.discrete[i]);
   const Verification& v = p.candidate.verification;
   out.visible_fraction = v.visible_fraction();
   const auto [place, turn] = predicted_errors(part, out);
   // "Found" is 5 % of the diameter at the rim, half a diameter from the centre.
-  out.score = probability(v) *
-              probability_below(0.05 * part.diameter_mm, std::hypot(place, turn * 0.5 * part.diameter_mm)) *
-              (share_of_first(out) / (1 + p.class_odds));
+  answer.place = probability(v) / (1 + p.class_odds);
+  answer.held = probability_below(0.05 * part.diameter_mm, std::hypot(place, turn * 0.5 * part.diameter_mm));
+  out.score = answer.place * answer.held * share_of_first(out);
   if (recognition.tolerance_mm > 0 || recognition.tolerance_rad > 0) {
     double within = out.score;
     if (recognition.tolerance_mm > 0) within *= probability_below(recognition.tolerance_mm, place);
     if (recognition.tolerance_rad > 0) within *= probability_below(recognition.tolerance_rad, turn);
     out.p_within_tolerance = within;
   }
-  return out;
+  return answer;
 }
 
 /// Tells of each refusal which answer its nearest miss lies next to.
@@ -230,18 +250,22 @@ Instances recognize(const Primitives& primitives, const PrimitiveModel& observat
   const double shared_mm2 = common_variance(last);
   for (std::size_t i = 0; i < found.size(); ++i) {
     const Polished& p = found[i];
-    Instance instance = make_instance(p, last[i], shared_mm2, parts, options);
+    Answer answer = make_answer(p, last[i], shared_mm2, parts, options);
+    Instance& instance = answer.instance;
     const auto kept_back = [&](const char* test, double value, double limit) {
       add_reason(out.rejected, {instance.part, "acceptance", test, value, limit, 1,
                                 place_of(parts[static_cast<std::size_t>(p.candidate.part)], p.candidate)});
     };
-    if (const double sure = instance.score / share_of_first(instance); sure < kGivenOut) {
-      kept_back("probability", sure, kGivenOut);
+    if (answer.place < kGivenOut) {
+      kept_back("probability", answer.place, kGivenOut);
       continue;
     }
     told.join(p.mask);
     if (instance.score < kGivenOut) {
-      kept_back("self_similar", instance.score, kGivenOut);
+      if (answer.held < kGivenOut)
+        kept_back("weak_direction", answer.held, kGivenOut);
+      else
+        kept_back("self_similar", instance.score, kGivenOut);
       out.uncertain.push_back(std::move(instance));
     } else if (instance.p_within_tolerance && *instance.p_within_tolerance < kGivenOut) {
       kept_back("tolerance", *instance.p_within_tolerance, kGivenOut);

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "render_scores.hpp"
+#include "tribin/part/symmetry.hpp"
 #include "tribin/pose/index_render.hpp"
 #include "tribin/pose/look_up.hpp"
 
@@ -57,10 +58,10 @@ void add_half_turns(const SceneDepth& scene, const Part& part, const Pose& pose,
 
 // A search on the likelihood, because ICP slides past the small features that decide. (The view's points instead of
 // renders rank the right spin behind the eighth in 15 % of the cases, renders in 2 %.)
-std::vector<Pose> spins(const SceneDepth& scene, const Part& part, const Pose& pose) {
+std::vector<Pose> spins(const SceneDepth& scene, const Part& part, const Pose& pose, std::size_t most) {
   std::vector<Pose> out;
   constexpr int kSpins = 120;  // 3 deg: a hole of 5 % of the diameter at its rim
-  constexpr std::size_t kBest = 8, kMost = 24;
+  constexpr std::size_t kBest = 8;
   constexpr std::size_t kLooked = 24;  // maxima on few pixels that are looked at again on more
   const int few = step_for(part, scene, pose, kCompareFew), step = step_for(part, scene, pose, kPolishPixels);
   for (const ContinuousSymmetry& axis : part.nearly_round) {
@@ -87,8 +88,8 @@ std::vector<Pose> spins(const SceneDepth& scene, const Part& part, const Pose& p
       best_first();
     }
     // Where the scan hardly tells the spins apart, all of them are alternatives.
-    std::size_t keep = std::min(kBest, maxima.size());
-    while (keep < std::min(kMost, maxima.size()) &&
+    std::size_t keep = std::min({kBest, most, maxima.size()});
+    while (keep < std::min(most, maxima.size()) &&
            score[static_cast<std::size_t>(maxima[keep])] > score[static_cast<std::size_t>(maxima[0])] - kUndecided)
       ++keep;
     // Refinement hardly turns what is nearly round: the spins are brought to their best by halves of the step.
@@ -135,7 +136,20 @@ std::vector<Pose> rivals(const SceneDepth& scene, const Part& part, const Pose& 
   const double roughly = 0.05 * part.diameter_mm;
   for (const Pose& other : halves)
     if (score(other, roughly) > own - kBehind) out.push_back(other);
-  return out;
+  if (part.nearly_round.size() != 1) return out;
+  // Turned over, a nearly round part has a spin of its own, that no motion of the part tells: the likeliest two stand
+  // for all of that side. A tooth beside a tooth of the scan, it would look worse than it is.
+  const SymmetryGroup round = {{}, part.nearly_round};
+  std::vector<Pose> sides = {pose}, settled;
+  for (const Pose& other : out) {
+    if (std::any_of(sides.begin(), sides.end(),
+                    [&](const Pose& side) { return same_placing(part, round, side, other, near, 4 * kDegree); }))
+      continue;
+    sides.push_back(other);
+    constexpr std::size_t kLikeliest = 2;
+    for (const Pose& spin : spins(scene, part, other, kLikeliest)) settled.push_back(spin);
+  }
+  return settled;
 }
 
 void add_weakest_moves(const Part& part, const PoseCandidate& from, std::vector<Pose>& out) {

@@ -13,11 +13,13 @@ inline constexpr double kCompareFew = 1000;  // and those that all its rivals ar
 inline constexpr double kUndecided = 30;
 
 /// Poses that the part's own shape confuses with this one: self-similar ones, half turns about the faces that are seen.
+/// Of a nearly round part the other sides only, at their own likeliest spins.
 std::vector<Pose> rivals(const SceneDepth& scene, const Part& part, const Pose& pose);
 
 /// Spins about the axes that the part is nearly round about: the best rendered poses over the whole turn, each brought
 /// to its best angle.
-std::vector<Pose> spins(const SceneDepth& scene, const Part& part, const Pose& pose);
+/// \param most  that are wanted of each axis: as many as the scan hardly tells apart, else the best eight.
+std::vector<Pose> spins(const SceneDepth& scene, const Part& part, const Pose& pose, std::size_t most = 24);
 
 /// The pose moved to both sides along the direction that its information holds least: slots and steps make local minima
 /// there that refinement does not leave.

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "instance_report.hpp"
+#include "tribin/part/symmetry.hpp"
 
 namespace tribin {
 namespace {
@@ -30,7 +31,7 @@ Mat6 origin_from_center(const Part& part, const Pose& pose) {
 std::vector<Vector6> free_directions_about_center(const Part& part, const Pose& camera_from_part) {
   std::vector<Vector6> out;
   const Eigen::Vector3d c = camera_from_part * Eigen::Vector3d(part.box_center());
-  for (const ContinuousSymmetry& s : part.symmetry.continuous) {
+  for (const ContinuousSymmetry& s : all_symmetries(part).continuous) {
     const Eigen::Vector3d w = camera_from_part.linear() * Eigen::Vector3d(s.axis).normalized();
     const Eigen::Vector3d p = camera_from_part * Eigen::Vector3d(s.point);
     Vector6 d;
@@ -54,7 +55,7 @@ struct Held {
 Held held_directions(const Part& part, const Refinement& refinement) {
   Held out;
   out.scale = scale_of_motion(part.gyration_mm);
-  out.free = static_cast<int>(part.symmetry.continuous.size());
+  out.free = static_cast<int>(all_symmetries(part).continuous.size());
   const Mat6 keep = off_directions(free_directions_about_center(part, refinement.camera_from_part), Vector6(out.scale));
   // What nothing holds is known to a diameter; free directions alone have no information.
   const Mat6 h = out.scale.asDiagonal() * Mat6(refinement.information) * out.scale.asDiagonal();

@@ -238,6 +238,7 @@ std::string sentence_of(const Reason& r) {
       {"measured_fraction", "Too little of it is measured"},
       {"own_surface", "Most of what would hold it belongs to a wall, a floor or a rim"},
       {"self_similar", "It stands there, but its turn is not settled"},
+      {"weak_direction", "It stands there, but a direction of its pose is not held"},
       {"tolerance", "Its place is not sure enough for the tolerance asked for"},
       {"cylinder_radius", "A cylinder's radius is another one's"},
       {"cylinder_height", "A cylinder's height is another one's"},

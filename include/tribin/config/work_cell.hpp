@@ -81,6 +81,7 @@ struct CellPart {
   std::string unit = "mm";  ///< of CAD files that name none: mm, cm, m, inch
   double mass_kg = 0;       ///< 0 = not known
   std::vector<std::string> grippers;
+  bool free_spin = false;                  ///< its turn about its nearly round axis makes no difference
   double max_tilt_rad = 40 * kDegree;      ///< of the approach to the vertical
   std::vector<PickPoint> pick_points;      ///< empty = grasps are found from the part's surfaces
   Pose slot_from_part = Pose::Identity();  ///< how it stands in a slot, and at the station

@@ -4,6 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "tribin/part/part.hpp"
+
 namespace tribin::eval {
 
 // The layout of a BOP data set: what lies where, and what is to be looked for in which image.
@@ -13,6 +15,7 @@ struct BopObject {
   int id = 0;                  ///< obj_id
   std::string name;            ///< `name` of models_info.json, else obj_%06d
   std::filesystem::path file;  ///< its mesh [mm]
+  SymmetryGroup symmetry;      ///< as models_info.json states it
 };
 
 /// The parts of `models_dir` (obj_%06d.ply), by id.

@@ -52,6 +52,8 @@ struct Part {
   double area_mm2 = 0;
   double gyration_mm = 0;  ///< rms distance of the surface from the box centre: turns radians into mm
   SymmetryGroup symmetry;
+  SymmetryGroup declared;  ///< motions that make no difference to who uses the part, though details of it move; empty
+                           ///< as compiled, see declare_free_spin
   std::vector<SelfSimilarPose> self_similar;
   std::vector<ContinuousSymmetry>
       nearly_round;  ///< axes about which turns leave most of the part in place: spins are searched

@@ -51,4 +51,23 @@ struct SymmetryResult {
 ///                 judged.
 SymmetryResult find_symmetries(const Mesh& mesh, const SymmetryOptions& options = {});
 
+/// Turns about the axes that the part is nearly round about make no difference: a toothed wheel is wanted at its place,
+/// at whichever tooth. Recognition then tells one of the turns that the scan leaves, names the turn free, and does not
+/// keep the part back for it.
+/// \throws Error  bad_option for a part that is not nearly round about any axis.
+void declare_free_spin(Part& part);
+
+/// Motions that make no difference, said by others (a data set's models_info.json, a work cell); those that are
+/// symmetries of the part anyway are left out.
+void declare_symmetry(Part& part, const SymmetryGroup& group);
+
+/// All that makes no difference: the part's own symmetries and what is declared, products of both among the discrete
+/// ones, the identity first.
+SymmetryGroup all_symmetries(const Part& part);
+
+/// Do two poses of one part mean the same placing, modulo a group?
+/// \param distance_mm, angle  how far the centre of its box may be off, and how far it may be turned.
+bool same_placing(const Part& part, const SymmetryGroup& group, const Pose& a, const Pose& b, double distance_mm,
+                  double angle);
+
 }  // namespace tribin
