@@ -25,7 +25,11 @@ void add_axis(const Part& part, const ContinuousSymmetry& axis, SymmetryGroup& g
 
 void add_motion(const Part& part, const Pose& motion, SymmetryGroup& group) {
   if (group.discrete.empty()) group.discrete.push_back(Pose::Identity());
-  if (!same_placing(part, group, Pose::Identity(), motion, same_mm(part), kSameTurn)) group.discrete.push_back(motion);
+  const SymmetryGroup turns = {{}, group.continuous};
+  if (std::none_of(group.discrete.begin(), group.discrete.end(), [&](const Pose& known) {
+        return same_placing(part, turns, known, motion, same_mm(part), kSameTurn);
+      }))
+    group.discrete.push_back(motion);
 }
 
 }  // namespace

@@ -114,7 +114,7 @@ double common_error_mm(const std::vector<double>& means, const std::vector<doubl
   return std::sqrt(std::max(0.0, sizes[sizes.size() / 2] / 0.455));
 }
 
-std::vector<double> likelihoods_of(const SceneDepth& scene, const Predictions& all) {
+std::vector<double> likelihoods_of(const Predictions& all) {
   // All poses are judged on the union of their windows: what one explains and another does not counts against the
   // other.
   std::vector<double> out(all.of.size(), 0.0);
@@ -265,7 +265,7 @@ std::vector<std::size_t> in_order(std::size_t n) {
 
 std::vector<double> log_likelihoods(const SceneDepth& scene, Detail detail,
                                     std::span<const std::pair<const Part*, Pose>> poses, int step_px) {
-  return likelihoods_of(scene, Predictions(scene, detail, poses, step_px));
+  return likelihoods_of(Predictions(scene, detail, poses, step_px));
 }
 
 Ranking rank_again(const SceneDepth& scene, Detail detail, std::span<const std::pair<const Part*, Pose>> poses,
@@ -277,7 +277,7 @@ Ranking rank_poses(const SceneDepth& scene, Detail detail, std::span<const std::
                    int step_px) {
   const Predictions all(scene, detail, poses, step_px);
   std::vector<std::size_t> order = in_order(poses.size());
-  sort_by(likelihoods_of(scene, all), order);
+  sort_by(likelihoods_of(all), order);
   return rank_by_odds(scene, all, std::move(order), {});
 }
 
