@@ -54,6 +54,28 @@ void add_half_turns(const SceneDepth& scene, const Part& part, const Pose& pose,
   }
 }
 
+/// A part that is nearly round, turned over so that one of its faces across the axis takes the place of another: of a
+/// wheel that shows one face, the hub may be on either side.
+void add_turned_over(const Part& part, const ContinuousSymmetry& axis, const Pose& pose, std::vector<Pose>& out) {
+  const Vec3 along = axis.axis.normalized();
+  constexpr std::size_t kFaces = 12;  // best exposed
+  const std::vector<PartFeature> faces = visible_features(part, PrimitiveType::plane, kFaces);
+  std::vector<double> middles;  // along the axis
+  for (const PartFeature& up : faces)
+    for (const PartFeature& down : faces) {
+      const double across = std::cos(4 * kDegree);
+      if (up.primitive->axis.dot(along) < across || down.primitive->axis.dot(along) > -across) continue;
+      const double middle = 0.5 * along.dot(up.primitive->point + down.primitive->point - 2 * axis.point);
+      if (std::any_of(middles.begin(), middles.end(),
+                      [&](double other) { return std::abs(other - middle) < 0.01 * part.diameter_mm; }))
+        continue;
+      middles.push_back(middle);
+      Vec3 u, v;
+      orthonormal_basis(along, u, v);
+      out.push_back(turned(pose, {u, axis.point + middle * along}, kPi));
+    }
+}
+
 }  // namespace
 
 // A search on the likelihood, because ICP slides past the small features that decide. (The view's points instead of
@@ -137,6 +159,10 @@ std::vector<Pose> rivals(const SceneDepth& scene, const Part& part, const Pose& 
   for (const Pose& other : halves)
     if (score(other, roughly) > own - kBehind) out.push_back(other);
   if (part.nearly_round.size() != 1) return out;
+  std::vector<Pose> over;
+  add_turned_over(part, part.nearly_round[0], pose, over);
+  for (const Pose& other : over)
+    if (score(other, roughly) > own - kBehind) out.push_back(other);
   // Turned over, a nearly round part has a spin of its own, that no motion of the part tells: the likeliest two stand
   // for all of that side. A tooth beside a tooth of the scan, it would look worse than it is.
   const SymmetryGroup round = {{}, part.nearly_round};
