@@ -138,7 +138,6 @@ Polished polish_once(const SceneDepth& scene, std::span<const Part> parts, const
   add_weakest_moves(part, settled, poses);
   poses.insert(poses.end(), also.begin(), also.end());
   const std::vector<Pose> turned = spins(scene, part, settled.camera_from_part);
-  const std::size_t first_rival = 1 + turned.size();
   poses.insert(poses.begin(), turned.begin(), turned.end());
   poses.insert(poses.begin(), settled.camera_from_part);
   std::vector<Verification> checks(poses.size());
@@ -146,12 +145,7 @@ Polished polish_once(const SceneDepth& scene, std::span<const Part> parts, const
     const auto k = static_cast<std::size_t>(i);
     RefineOptions options = refine_options(part, Detail::coarse, few, 3, std::max(0.012 * part.diameter_mm, noise));
     options.outlines = true;
-    if (k >= first_rival) {
-      poses[k] = refine_guarded(part, Detail::coarse, scene, poses[k], options).camera_from_part;
-    } else if (k > 0) {  // what the settled pose gets wrong of its place, because its spin is, two steps mend
-      options.iterations = 2;
-      poses[k] = refine_pose(part.coarse_mesh, scene, poses[k], options).camera_from_part;
-    }
+    if (k > 0) poses[k] = refine_guarded(part, Detail::coarse, scene, poses[k], options).camera_from_part;
     checks[k] = verify_pose(part.coarse_mesh, scene, poses[k],
                             verification_options(part, Detail::coarse, few, 0.004 * part.diameter_mm));
   });

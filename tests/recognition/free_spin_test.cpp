@@ -33,12 +33,15 @@ TEST(FreeSpin, GivesOutAWheelWhoseToothIsNotToldOnlyWhereItsSpinIsFree) {
       (Eigen::AngleAxisd(kPi - 0.2, Eigen::Vector3d::UnitX()) * Eigen::AngleAxisd(0.7, Eigen::Vector3d::UnitZ()))
           .toRotationMatrix();
   truth.translation() = Eigen::Vector3d(12, -7, 600);
-  const Scan scan = test::posed_scan({{&wheel.mesh, truth}}, Vec3(0, 0, -1), -700, 0.1, 0.8, 3, 800, 640);
-
-  const Found kept_back = find_parts(scan, parts);
-  EXPECT_TRUE(kept_back.instances.items.empty());
-  ASSERT_EQ(kept_back.instances.uncertain.size(), 1u);
-  EXPECT_GE(kept_back.instances.uncertain[0].alternatives.size(), 8u);
+  Scan scan;
+  for (unsigned seed = 1; seed <= 4; ++seed) {
+    SCOPED_TRACE(seed);
+    scan = test::posed_scan({{&wheel.mesh, truth}}, Vec3(0, 0, -1), -700, 0.1, 0.8, seed, 800, 640);
+    const Found kept_back = find_parts(scan, parts);
+    EXPECT_TRUE(kept_back.instances.items.empty());
+    ASSERT_EQ(kept_back.instances.uncertain.size(), 1u);
+    EXPECT_GE(kept_back.instances.uncertain[0].alternatives.size(), 15u);
+  }
 
   declare_free_spin(parts[0]);
   const Found found = find_parts(scan, parts);
