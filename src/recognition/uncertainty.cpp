@@ -63,7 +63,9 @@ Held held_directions(const Part& part, const Refinement& refinement) {
   const Eigen::SelfAdjointEigenSolver<Mat6> eigen(Mat6(keep * (h + least) * keep));
   out.directions = eigen.eigenvectors();
   out.sigma.setZero();
-  for (int k = out.free; k < 6; ++k) out.sigma[k] = 1 / std::sqrt(eigen.eigenvalues()(k));
+  // Sums of a million pixels leave what nothing holds a hair below zero.
+  const double floor = least(0, 0);
+  for (int k = out.free; k < 6; ++k) out.sigma[k] = 1 / std::sqrt(std::max(eigen.eigenvalues()(k), floor));
   return out;
 }
 
