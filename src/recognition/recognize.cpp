@@ -18,8 +18,8 @@ namespace tribin {
 namespace {
 
 // Given out is what is right two times in three, in full pose, because a grip at a wrong pose costs more than a part
-// that waits for the next scan; a place that is sure but not which of its self-similar poses is told apart from them. Of
-// 1478 answers in 160 unseen heaps 8 right and 7 wrong ones lie between that and an even chance.
+// that waits for the next scan; a place that is sure but not which of its self-similar poses is told apart from them.
+// Of 1478 answers in 160 unseen heaps 8 right and 7 wrong ones lie between that and an even chance.
 constexpr double kGivenOut = 2.0 / 3;
 
 /// Probability that an accepted verification is right in place and class. \source ours: a logistic of the support, the
