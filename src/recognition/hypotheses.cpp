@@ -44,11 +44,11 @@ bool SceneFeatures::changed_near(const Vec3f& point, double reach_mm) const {
 }
 
 std::vector<Vec3f> points_of(const CellMask& mask, const Surfels& surfels) {
-  constexpr int kEvery = 4;
+  const int every = mask.count < 1000 ? 1 : 4;  // a small part must not fall between
   const Image<std::int32_t>& grid = surfels.surfel_of_cell;
   std::vector<Vec3f> out;
-  for (int j = 0; j < grid.height; j += kEvery)
-    for (int i = 0; i < grid.width; i += kEvery)
+  for (int j = 0; j < grid.height; j += every)
+    for (int i = 0; i < grid.width; i += every)
       if (mask.holds(grid.index(i, j)) && grid(i, j) >= 0)
         out.push_back(surfels.position[static_cast<std::size_t>(grid(i, j))]);
   return out;

@@ -42,7 +42,7 @@ struct SceneFeatures {
 /// Marks cells as explained and drops the features that lie in them.
 void claim_cells(SceneFeatures& scene, const CellMask& mask);
 
-/// Where the cells lie: every fourth of them in both directions.
+/// Where the cells lie: all of a few, of many every fourth in both directions.
 std::vector<Vec3f> points_of(const CellMask& mask, const Surfels& surfels);
 
 SceneFeatures make_scene_features(const Primitives& primitives, const PrimitiveModel& observation,

@@ -14,11 +14,41 @@ double mean_view_area(const Part& part) {
   return sum / static_cast<double>(part.views.size());
 }
 
-/// Ids of the primitives that are too large for the part, as flags.
+/// Is one plane the other's going on, behind what stands in front? By the part's thickness nothing else is: 1 % of the
+/// diameter where the planes are, and 3 deg, what a warped wall bends and a small piece's normal is unsure by.
+bool goes_on_in(const SceneFeature& f, const SceneFeature& g, const Part& part) {
+  const double off = 0.01 * part.diameter_mm;
+  return f.primitive->axis.dot(g.primitive->axis) > std::cos(3 * kDegree) &&
+         std::abs(f.primitive->axis.dot(g.centroid - f.centroid)) < off &&
+         std::abs(g.primitive->axis.dot(f.centroid - g.centroid)) < off;
+}
+
+/// Ids of the primitives that are too large for the part, as flags. A wall that parts hide here and there is seen in
+/// pieces, each small enough for a part: upright planes that go on in each other over more than a part are one. Not
+/// level ones, for plates that lie side by side have their upper faces in one plane.
 std::vector<bool> background_flags(const SceneFeatures& scene, const Part& part) {
   std::vector<bool> background(scene.primitives->items.size() + 1, false);
+  const SceneFeature* floor = nullptr;
+  for (const SceneFeature& f : scene.features) {
+    if (!is_background(f, part)) continue;
+    background[static_cast<std::size_t>(f.primitive->id)] = true;
+    if (f.primitive->type == PrimitiveType::plane &&
+        (floor == nullptr || f.primitive->surfels.size() > floor->primitive->surfels.size()))
+      floor = &f;
+  }
+  if (floor == nullptr) return background;
+  std::vector<const SceneFeature*> upright;
+  constexpr double kDraft = 20 * kDegree;  // of the walls of bins
   for (const SceneFeature& f : scene.features)
-    if (is_background(f, part)) background[static_cast<std::size_t>(f.primitive->id)] = true;
+    if (f.primitive->type == PrimitiveType::plane &&
+        std::abs(f.primitive->axis.dot(floor->primitive->axis)) < std::sin(kDraft))
+      upright.push_back(&f);
+  for (const SceneFeature* f : upright)
+    for (const SceneFeature* g : upright) {
+      const double reach = 0.5 * ((f->centroid - g->centroid).norm() + f->reach_mm + g->reach_mm);
+      if (f != g && goes_on_in(*f, *g, part) && reach > 1.1 * part.diameter_mm)
+        background[static_cast<std::size_t>(f->primitive->id)] = true;
+    }
   return background;
 }
 
