@@ -30,31 +30,24 @@ bool Solid::inside(const Vec3& point) const {
   const Vec3 along = Vec3(0.2113, 0.4517, 0.8668).normalized();
   const Vec3 inverse = along.cwiseInverse();
   double nearest = 1e300, side = -1;
-  std::array<std::uint32_t, 64> stack{};  // one a level, of halves: enough for any mesh
-  int depth = 1;
-  while (depth > 0) {
-    const auto index = stack[static_cast<std::size_t>(--depth)];
-    const auto& node = tree_.nodes[index];
-    const Vec3 enter = (node.low - point).cwiseProduct(inverse), leave = (node.high - point).cwiseProduct(inverse);
-    if (std::max(0.0, enter.maxCoeff()) > std::min(nearest, leave.minCoeff())) continue;
-    if (node.right != 0) {
-      stack[static_cast<std::size_t>(depth++)] = node.right;
-      stack[static_cast<std::size_t>(depth++)] = index + 1;
-      continue;
-    }
-    for (std::uint32_t i = node.begin; i < node.end; ++i) {
-      // \source Moeller and Trumbore, "Fast, minimum storage ray-triangle intersection" (1997).
-      const auto& [a, ab, ac] = triangles_[tree_.order[i]];
-      const Vec3 p = along.cross(ac);
-      const double det = ab.dot(p);
-      if (det == 0) continue;
-      const Vec3 s = point - a, q = s.cross(ab);
-      const double u = s.dot(p) / det, v = along.dot(q) / det, t = ac.dot(q) / det;
-      if (u < 0 || v < 0 || u + v > 1 || t < 0 || t >= nearest) continue;
-      nearest = t;
-      side = ab.cross(ac).dot(along);
-    }
-  }
+  visit(
+      tree_,
+      [&](const auto& node) {
+        const Vec3 enter = (node.low - point).cwiseProduct(inverse), leave = (node.high - point).cwiseProduct(inverse);
+        return std::max(0.0, enter.maxCoeff()) <= std::min(nearest, leave.minCoeff());
+      },
+      [&](std::uint32_t triangle) {
+        // \source Moeller and Trumbore, "Fast, minimum storage ray-triangle intersection" (1997).
+        const auto& [a, ab, ac] = triangles_[triangle];
+        const Vec3 p = along.cross(ac);
+        const double det = ab.dot(p);
+        if (det == 0) return;
+        const Vec3 s = point - a, q = s.cross(ab);
+        const double u = s.dot(p) / det, v = along.dot(q) / det, t = ac.dot(q) / det;
+        if (u < 0 || v < 0 || u + v > 1 || t < 0 || t >= nearest) return;
+        nearest = t;
+        side = ab.cross(ac).dot(along);
+      });
   return side > 0;
 }
 
@@ -65,28 +58,21 @@ std::optional<Solid::Depth> Solid::depth(const Vec3& point, const Vec3& normal) 
     return {};
   double least2 = 1e300;
   Depth out;
-  std::array<std::uint32_t, 64> stack{};
-  int depth = 1;
-  while (depth > 0) {
-    const auto index = stack[static_cast<std::size_t>(--depth)];
-    const auto& node = tree_.nodes[index];
-    if ((node.low - point).cwiseMax(point - node.high).cwiseMax(Vec3::Zero()).squaredNorm() >= least2) continue;
-    if (node.right != 0) {
-      stack[static_cast<std::size_t>(depth++)] = node.right;
-      stack[static_cast<std::size_t>(depth++)] = index + 1;
-      continue;
-    }
-    for (std::uint32_t i = node.begin; i < node.end; ++i) {
-      const auto& [a, ab, ac] = triangles_[tree_.order[i]];
-      const Vec3 facet = ab.cross(ac);
-      if (facet.dot(normal) > kAgainst * facet.norm()) continue;
-      const Vec3 at = nearest_on_triangle(a, ab, ac, point);
-      const double distance2 = (at - point).squaredNorm();
-      if (distance2 >= least2) continue;
-      least2 = distance2;
-      out.outward = at - point;
-    }
-  }
+  visit(
+      tree_,
+      [&](const auto& node) {
+        return (node.low - point).cwiseMax(point - node.high).cwiseMax(Vec3::Zero()).squaredNorm() < least2;
+      },
+      [&](std::uint32_t triangle) {
+        const auto& [a, ab, ac] = triangles_[triangle];
+        const Vec3 facet = ab.cross(ac);
+        if (facet.dot(normal) > kAgainst * facet.norm()) return;
+        const Vec3 at = nearest_on_triangle(a, ab, ac, point);
+        const double distance2 = (at - point).squaredNorm();
+        if (distance2 >= least2) return;
+        least2 = distance2;
+        out.outward = at - point;
+      });
   out.mm = std::sqrt(least2);
   if (least2 == 1e300 || out.mm < 1e-6) return {};
   out.outward /= out.mm;

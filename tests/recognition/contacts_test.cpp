@@ -105,12 +105,15 @@ TEST(Separate, NoPairIsDeeperThanBeforeAndWhatTouchesNothingStays) {
     for (const Overlap& o : after) {
       const auto same =
           std::find_if(before.begin(), before.end(), [&](const Overlap& b) { return b.a == o.a && b.b == o.b; });
-      if (same != before.end()) EXPECT_LE(o.depth_mm, same->depth_mm + 2e-3);
+      if (same != before.end()) {
+        EXPECT_LE(o.depth_mm, same->depth_mm + 2e-3);
+      }
     }
     EXPECT_EQ((bodies[4].camera_from_body.matrix() - old[4].camera_from_body.matrix()).norm(), 0);
-    if (before.empty())
+    if (before.empty()) {
       for (std::size_t i = 0; i < bodies.size(); ++i)
         EXPECT_EQ((bodies[i].camera_from_body.matrix() - old[i].camera_from_body.matrix()).norm(), 0);
+    }
   }
   EXPECT_GT(overlapped, 0);
   EXPECT_GE(resolved, overlapped / 2);

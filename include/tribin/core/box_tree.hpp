@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <limits>
 #include <numeric>
@@ -55,6 +56,28 @@ BoxTree<Vec> make_box_tree(const std::vector<Vec>& middles, const Grow& grow, st
   };
   if (!middles.empty()) build(build, 0, static_cast<std::uint32_t>(middles.size()));
   return tree;
+}
+
+/// Looks at what lies in boxes worth it, the first half of each before the second.
+/// \param enters  enters(node): may it hold something of interest? Asked when its turn comes, so that what was found
+///                before may close it.
+/// \param look    look(thing), in the order of the tree.
+template <typename Vec, typename Enters, typename Look>
+void visit(const BoxTree<Vec>& tree, const Enters& enters, const Look& look) {
+  if (tree.nodes.empty()) return;
+  std::array<std::uint32_t, 64> stack{};  // one a level, of halves: enough for any mesh
+  std::size_t depth = 1;
+  while (depth > 0) {
+    const std::uint32_t index = stack[--depth];
+    const typename BoxTree<Vec>::Node& node = tree.nodes[index];
+    if (!enters(node)) continue;
+    if (node.right != 0) {
+      stack[depth++] = node.right;
+      stack[depth++] = index + 1;
+      continue;
+    }
+    for (std::uint32_t i = node.begin; i < node.end; ++i) look(tree.order[i]);
+  }
 }
 
 }  // namespace tribin
