@@ -65,6 +65,28 @@ double edge_along(const SceneDepth& scene, double x, double y, const Vec2& m, co
   return std::nan("");
 }
 
+/// The same where the sensor draws steps out: the edge is where the depth has gone half of the way from the part's to
+/// that of what lies beyond. NaN where that is no farther than noise makes it, or nearer.
+/// \param from, to  between them the step is sought, beyond them it is over.
+double drawn_out_edge(const SceneDepth& scene, double x, double y, const Vec2& m, double z_mm, double from, double to,
+                      int across) {
+  const auto depth = [&](double s) -> double {
+    const double px = x + s * m[0], py = y + s * m[1];
+    if (!(px > -1 && py > -1)) return 0;
+    const int u = nearest_pixel(px), v = nearest_pixel(py);
+    return scene.z_mm.contains(u, v) && scene.z_mm(u, v) > 0 ? scene.z_mm(u, v) : 0;
+  };
+  double beyond = 0;
+  for (double s = to; beyond == 0 && s <= to + across; ++s) beyond = depth(s);
+  if (!(beyond - z_mm > 12 * scene.median_sigma_mm)) return std::nan("");
+  const double half = 0.5 * (z_mm + beyond);
+  const auto off = [&](double s) { return depth(s) == 0 || depth(s) > half; };
+  // Two in a row: a single stray pixel is no edge.
+  for (double s = from; s <= to; ++s)
+    if (off(s) && off(s + 1)) return s - 0.5;
+  return std::nan("");
+}
+
 /// An edge between a facet that looks at the camera and one that does not.
 struct SilhouetteEdge {
   std::uint32_t from, to;  ///< vertices, in the facet's winding
@@ -114,6 +136,8 @@ ContourSums contour_sums(const RenderMesh& mesh, const SceneDepth& scene, const 
   const double inverse_step = 1.0 / render.step;
   // A shade is as wide as what throws it is high.
   const int across = std::max(render.width, render.height) * render.step / 2;
+  const int rim = scene.rim(1);
+  const double edge_variance = kEdgeSigmaPx * kEdgeSigmaPx + scene.edge_blur_px * scene.edge_blur_px;
   double squares = 0, weights = 0;
   Eigen::Matrix<double, 6, 6> h = Eigen::Matrix<double, 6, 6>::Zero();
   Eigen::Matrix<double, 6, 1> b = Eigen::Matrix<double, 6, 1>::Zero();
@@ -124,7 +148,8 @@ ContourSums contour_sums(const RenderMesh& mesh, const SceneDepth& scene, const 
   for (const SilhouetteEdge& edge : silhouette) {
     const Eigen::Vector3f q0 = turn * mesh.vertices[edge.from] + shift, q1 = turn * mesh.vertices[edge.to] + shift;
     if (q0.z() <= 1 || q1.z() <= 1) continue;
-    if (edge.height_mm < kSteepest * q0.norm()) continue;
+    // The last facets of a round surface are all seen flat. Where steps are drawn out they do as well as others.
+    if (rim == 0 && edge.height_mm < kSteepest * q0.norm()) continue;
     const Vec2 a = camera.project(Vec3(q0.cast<double>())), e = camera.project(Vec3(q1.cast<double>()));
     Vec2 along = e - a;
     const double length = along.norm();
@@ -158,20 +183,32 @@ ContourSums contour_sums(const RenderMesh& mesh, const SceneDepth& scene, const 
       const double margin = 1.2 * render.step;
       if (!rendered(-margin, inside) || std::abs(1 / inside - z) > 0.01 * z) continue;
       if (rendered(margin, outside) && 1 / outside - z < 0.01 * z) continue;
-      const double s = edge_along(scene, q[0], q[1], m, plane, reach_px);
+      double s = std::nan("");
+      if (rim > 0) {
+        // What is seen well inside must be the part.
+        const double in = reach_px + rim;
+        const Vec2 at = q - m * in;
+        const int u = nearest_pixel(at[0]), v = nearest_pixel(at[1]);
+        if (rendered(-in, inside) && scene.z_mm.contains(u, v) &&
+            std::abs(scene.z_mm(u, v) - 1 / inside) < 6 * scene.median_sigma_mm)
+          s = drawn_out_edge(scene, q[0], q[1], m, z, -in, in, across);
+      } else {
+        s = edge_along(scene, q[0], q[1], m, plane, reach_px);
+      }
       if (!(std::abs(s) <= reach_px)) continue;
       // The edge of something in front is not the part's.
       const Vec2 edge_at = q + m * (s + 0.5);
       const double tolerance = 6 * scene.median_sigma_mm + z / camera.fx;
-      if (look_beside(scene, edge_at[0], edge_at[1], m[0], m[1], 1, 2, across, {n, rho, z}, tolerance) != Beside::ends)
+      if (rim == 0 &&
+          look_beside(scene, edge_at[0], edge_at[1], m[0], m[1], 1, 2, across, {n, rho, z}, tolerance) != Beside::ends)
         continue;
       const Eigen::Vector3d point = Eigen::Vector3d(camera.point(q[0], q[1], z));
       const Eigen::Vector3d g(m[0] * camera.fx * w, m[1] * camera.fy * w,
                               -(m[0] * camera.fx * point.x() + m[1] * camera.fy * point.y()) * w * w);
       Eigen::Matrix<double, 6, 1> jac;
       jac << g, (point - Eigen::Vector3d(center)).cross(g);
-      const double robust = 1 / (1 + s * s);  // Cauchy with a scale of two edge sigmas
-      const double wt = weight * robust / (kEdgeSigmaPx * kEdgeSigmaPx);
+      const double robust = 1 / (1 + 0.25 * s * s / edge_variance);  // Cauchy with a scale of two edge sigmas
+      const double wt = weight * robust / edge_variance;
       h += wt * jac * jac.transpose();
       b += wt * jac * s;
       squares += weight * robust * s * s;

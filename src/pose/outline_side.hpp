@@ -29,6 +29,8 @@ inline Beside beside_pixel(const SceneDepth& scene, int u, int v, float z_out, c
   if (along > -0.1) return z_out > facet.z ? Beside::ends : Beside::hidden;
   const double r = along * z_out - facet.rho;  // > 0: in front of the plane
   if (std::abs(r) <= tolerance_mm) return Beside::goes_on;
+  // A steep plane falls off faster than a step that is drawn out: behind the outline something ends all the same.
+  if (scene.edge_blur_px > 0 && r > 0 && z_out - facet.z > tolerance_mm) return Beside::ends;
   return r < 0 ? Beside::ends : Beside::hidden;
 }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "tribin/core/parallel.hpp"
+#include "tribin/pose/edge_blur.hpp"
 
 namespace tribin {
 
@@ -26,6 +27,7 @@ SceneDepth make_scene_depth(const Scan& scan, const Surfels& surfels) {
     std::nth_element(tiles.begin(), tiles.begin() + tiles.size() / 2, tiles.end());
     out.median_sigma_mm = tiles[tiles.size() / 2];
   }
+  out.edge_blur_px = edge_blur_px(out);
 
   // A break: a step that no surface below 80 deg of incidence makes between two pixels, and that noise does not make.
   const int w = scan.width(), h = scan.height();

@@ -117,6 +117,7 @@ void gather_points(const SceneDepth& scene, const IndexRender& render, const Eig
   const auto cx = static_cast<float>(center.x()), cy = static_cast<float>(center.y()),
              cz = static_cast<float>(center.z());
   const auto cad_variance = static_cast<float>(cad_sigma_mm * cad_sigma_mm);
+  const int rim = scene.rim(render.step);
   for (int j = begin; j < end; ++j) {
     const int v = render.v0 + j * render.step;
     const auto ry = static_cast<float>((v - camera.cy) / camera.fy);
@@ -125,7 +126,7 @@ void gather_points(const SceneDepth& scene, const IndexRender& render, const Eig
       if (k < 0) continue;
       const int u = render.u0 + i * render.step;
       const float z = scene.z_mm(u, v);
-      if (!(z > 0) || scene.near_break(u, v) || !inside_silhouette(render, i, j)) continue;
+      if (!(z > 0) || scene.near_break(u, v) || !inside_silhouette(render, i, j, rim)) continue;
       const auto rx = static_cast<float>((u - camera.cx) / camera.fx);
       const Vec3f& n = render.normal[static_cast<std::size_t>(k)];
       const float along = n[0] * rx + n[1] * ry + n[2];  // n . ray, negative

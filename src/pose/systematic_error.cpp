@@ -30,7 +30,7 @@ std::optional<SeenPixel> seen_pixel(const IndexRender& render, const SceneDepth&
   const int u = render.u0 + i * render.step, v = render.v0 + j * render.step;
   if (render.triangle[at] < 0) return {};
   const float z = scene.z_mm(u, v);
-  if (!(z > 0) || scene.near_break(u, v) || !inside_silhouette(render, i, j)) return {};
+  if (!(z > 0) || scene.near_break(u, v) || !inside_silhouette(render, i, j, scene.rim(render.step))) return {};
   const Eigen::Vector3d ray = scene.camera.ray(u, v);
   const Eigen::Vector3d n = render.normal[static_cast<std::size_t>(render.triangle[at])].cast<double>();
   SeenPixel out;

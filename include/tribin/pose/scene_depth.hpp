@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 
 #include "tribin/surfel/surfels.hpp"
 
@@ -20,6 +21,10 @@ struct SceneDepth {
   const Surfels* surfels = nullptr;
   double correlation_px = 0;
   double median_sigma_mm = 0;
+  double edge_blur_px = 0;  ///< how wide the sensor draws steps of depth (pose/edge_blur.hpp); 0 = as sharp as the grid
+
+  /// How many rendered pixels beside an outline the scan shows neither this side nor the other: two sd of the blur.
+  int rim(int step_px) const { return static_cast<int>(std::ceil(2 * edge_blur_px / step_px)); }
 
   /// Local sd of z [mm] at pixel (u, v).
   float sigma_mm(int u, int v) const {
