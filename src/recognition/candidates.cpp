@@ -258,12 +258,13 @@ std::vector<PoseCandidate> find_candidates(const SceneFeatures& features, SceneD
   scene.background = background_cells(features, part);
   std::vector<Pose> poses;
   if (source == Source::primitives) {
-    hypotheses_from_pairs(features, part, poses);
-    hypotheses_from_cylinders(features, part, poses);
-    hypotheses_from_planes(features, part, poses);
+    const SceneFeatures own = foreground(features, scene.background);
+    hypotheses_from_pairs(own, part, poses);
+    hypotheses_from_cylinders(own, part, poses);
+    hypotheses_from_planes(own, part, poses);
   } else {
     if (!search.pairs) search.pairs.emplace(part.sample_points, part.sample_normals, part.diameter_mm);
-    hypotheses_from_point_pairs(features, part, *search.pairs, poses);
+    hypotheses_from_point_pairs(features, scene.background, part, *search.pairs, poses);
   }
   // What lies within half a diameter of a pose's middle is looked at, and a quarter around it others compete for
   // places.

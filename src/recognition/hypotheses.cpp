@@ -27,14 +27,29 @@ SceneFeatures make_scene_features(const Primitives& primitives, const PrimitiveM
   return out;
 }
 
-void claim_cells(SceneFeatures& scene, const CellMask& mask) {
-  scene.claimed.join(mask);
-  // A feature of which more than half is explained starts nothing new.
+namespace {
+
+/// A feature of which more than half is explained starts nothing new.
+template <typename Explains>
+void drop_features(SceneFeatures& scene, const Explains& explains) {
   std::erase_if(scene.features, [&](const SceneFeature& f) {
     std::size_t inside = 0;
-    for (const std::uint32_t s : f.primitive->surfels) inside += scene.claimed.holds(scene.surfels->cell[s]);
+    for (const std::uint32_t s : f.primitive->surfels) inside += explains(scene.surfels->cell[s]);
     return 2 * inside > f.primitive->surfels.size();
   });
+}
+
+}  // namespace
+
+void claim_cells(SceneFeatures& scene, const CellMask& mask) {
+  scene.claimed.join(mask);
+  drop_features(scene, [&](std::uint32_t cell) { return scene.claimed.holds(cell); });
+}
+
+SceneFeatures foreground(const SceneFeatures& scene, const Image<std::uint8_t>& background) {
+  SceneFeatures out = scene;
+  drop_features(out, [&](std::uint32_t cell) { return background.data[cell] != 0; });
+  return out;
 }
 
 bool SceneFeatures::changed_near(const Vec3f& point, double reach_mm) const {
@@ -74,11 +89,6 @@ std::vector<PartFeature> visible_features(const Part& part, PrimitiveType type, 
                    [](const PartFeature& a, const PartFeature& b) { return a.exposed_mm2 > b.exposed_mm2; });
   if (out.size() > most) out.resize(most);
   return out;
-}
-
-bool is_background(const SceneFeature& feature, const Part& part) {
-  // A piece of the part reaches at most its diameter from its own centroid; noise and a merged neighbour add a little.
-  return feature.reach_mm > 1.1 * part.diameter_mm;
 }
 
 Matrix3 rotation_from_directions(const Vec3& x_part, const Vec3& y_part, const Vec3& x_camera, const Vec3& y_camera) {

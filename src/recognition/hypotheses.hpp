@@ -58,11 +58,12 @@ struct PartFeature {
 /// The part's primitives that can be seen, best exposed first.
 std::vector<PartFeature> visible_features(const Part& part, PrimitiveType type, std::size_t most);
 
-/// Too large to be a piece of the part: a table, a floor, a wall of the bin.
-bool is_background(const SceneFeature& feature, const Part& part);
-
-/// Flags the cells of the scan that belong to the background of a part or to an accepted instance.
+/// Flags the cells of the scan that belong to the background of a part, what is too large to be a piece of it (a table,
+/// a floor, a wall of the bin), or to an accepted instance.
 Image<std::uint8_t> background_cells(const SceneFeatures& scene, const Part& part);
+
+/// The scene without the features that lie in the background: those that hypotheses start from.
+SceneFeatures foreground(const SceneFeatures& scene, const Image<std::uint8_t>& background);
 
 /// One cylinder: both senses of the axis, spins, slides. Leaves 2 of 6 directions to the enumeration.
 void hypotheses_from_cylinders(const SceneFeatures& scene, const Part& part, std::vector<Pose>& out);
@@ -74,12 +75,15 @@ void hypotheses_from_pairs(const SceneFeatures& scene, const Part& part, std::ve
 /// Pairs of oriented points of what nothing explains vote for where the part's own pairs lie alike: for parts and views
 /// without handy primitives.
 /// \source B. Drost, M. Ulrich, N. Navab, S. Ilic, "Model globally, match locally", CVPR 2010, on surfels.
-void hypotheses_from_point_pairs(const SceneFeatures& scene, const Part& part, const PointPairTable& table,
-                                 std::vector<Pose>& out);
+/// \param background  of the part: background_cells.
+void hypotheses_from_point_pairs(const SceneFeatures& scene, const Image<std::uint8_t>& background, const Part& part,
+                                 const PointPairTable& table, std::vector<Pose>& out);
 
 /// The surfels of connected pieces of the scan that neither the background nor an accepted instance explains and that
 /// are large enough to be a piece of the part. Empty = nothing is left that could be one.
-std::vector<std::uint32_t> unexplained_surfels(const SceneFeatures& scene, const Part& part);
+/// \param background  background_cells.
+std::vector<std::uint32_t> unexplained_surfels(const SceneFeatures& scene, const Image<std::uint8_t>& background,
+                                               const Part& part);
 
 /// What neither a part nor the ground explains. The ground is the bin and what lies around it; without one, what is too
 /// large for any of the parts. Pieces smaller than those that could be one of the parts are left out.

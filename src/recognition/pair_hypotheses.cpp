@@ -26,9 +26,7 @@ void plane_plane(const SceneFeatures& scene, const Part& part, const std::vector
     for (std::size_t j = i + 1; j < scene.features.size(); ++j) {
       const SceneFeature &fa = scene.features[i], &fb = scene.features[j];
       const Primitive &a = *fa.primitive, &b = *fb.primitive;
-      if (a.type != PrimitiveType::plane || b.type != PrimitiveType::plane || is_background(fa, part) ||
-          is_background(fb, part))
-        continue;
+      if (a.type != PrimitiveType::plane || b.type != PrimitiveType::plane) continue;
       if ((fa.centroid - fb.centroid).norm() > part.diameter_mm) continue;
       const double angle = std::acos(std::clamp(a.axis.dot(b.axis), -1.0, 1.0));
       if (angle < 20 * kDegree || angle > 160 * kDegree) continue;  // nearly parallel faces fix no spin
@@ -73,8 +71,7 @@ void cylinder_cylinder(const SceneFeatures& scene, const Part& part, const std::
       const SceneFeature &fa = scene.features[i], &fb = scene.features[j];
       const Primitive &a = *fa.primitive, &b = *fb.primitive;
       if (a.type != PrimitiveType::cylinder || b.type != PrimitiveType::cylinder) continue;
-      if (is_background(fa, part) || is_background(fb, part) || (fa.centroid - fb.centroid).norm() > part.diameter_mm)
-        continue;
+      if ((fa.centroid - fb.centroid).norm() > part.diameter_mm) continue;
       const Eigen::Vector3d ma = middle_of(a), mb = middle_of(b);
       for (const PartFeature& na : cylinders) {
         const Primitive& p = *na.primitive;
@@ -127,11 +124,11 @@ void cylinder_plane(const SceneFeatures& scene, const Part& part, const std::vec
   const double step = 0.05 * part.diameter_mm;
   for (const SceneFeature& fc : scene.features) {
     const Primitive& a = *fc.primitive;
-    if (a.type != PrimitiveType::cylinder || is_background(fc, part)) continue;
+    if (a.type != PrimitiveType::cylinder) continue;
     const Eigen::Vector3d axis = a.axis, ma = middle_of(a);
     for (const SceneFeature& fp : scene.features) {
       const Primitive& b = *fp.primitive;
-      if (b.type != PrimitiveType::plane || is_background(fp, part)) continue;
+      if (b.type != PrimitiveType::plane) continue;
       if ((fc.centroid - fp.centroid).norm() > part.diameter_mm) continue;
       const double cosine = axis.dot(Eigen::Vector3d(b.axis));
       const bool across = std::abs(cosine) > std::cos(2 * kAngleTolerance);

@@ -18,9 +18,10 @@ struct OrientedPoints {
 };
 
 /// What is left to explain, thinned.
-OrientedPoints unexplained_points(const SceneFeatures& scene, const Part& part, double spacing_mm) {
+OrientedPoints unexplained_points(const SceneFeatures& scene, const Image<std::uint8_t>& background, const Part& part,
+                                  double spacing_mm) {
   OrientedPoints all, out;
-  for (const std::uint32_t s : unexplained_surfels(scene, part)) {
+  for (const std::uint32_t s : unexplained_surfels(scene, background, part)) {
     all.points.push_back(scene.surfels->position[s]);
     all.normals.push_back(scene.surfels->normal[s]);
   }
@@ -45,10 +46,10 @@ Pose pose_of(const Vec3f& part_point, const Vec3f& part_normal, const Vec3f& sce
 
 }  // namespace
 
-void hypotheses_from_point_pairs(const SceneFeatures& scene, const Part& part, const PointPairTable& table,
-                                 std::vector<Pose>& out) {
+void hypotheses_from_point_pairs(const SceneFeatures& scene, const Image<std::uint8_t>& background, const Part& part,
+                                 const PointPairTable& table, std::vector<Pose>& out) {
   const double spacing = 0.05 * part.diameter_mm;
-  const OrientedPoints seen = unexplained_points(scene, part, spacing);
+  const OrientedPoints seen = unexplained_points(scene, background, part, spacing);
   if (seen.points.size() < 8) return;
   const std::size_t cells = part.sample_points.size() * kTurns;
   const auto reach = static_cast<float>(part.diameter_mm * part.diameter_mm);

@@ -47,7 +47,7 @@ void hypotheses_from_cylinders(const SceneFeatures& scene, const Part& part, std
   const double step = 0.05 * part.diameter_mm;
   for (const SceneFeature& f : scene.features) {
     const Primitive& seen = *f.primitive;
-    if (seen.type != PrimitiveType::cylinder || is_background(f, part)) continue;
+    if (seen.type != PrimitiveType::cylinder) continue;
     const Vec3 seen_middle = seen.point + seen.axis * (0.5 * (seen.extent_min + seen.extent_max));
     for (const PartFeature& n : nominal) {
       const Primitive& c = *n.primitive;
@@ -73,7 +73,7 @@ void hypotheses_from_planes(const SceneFeatures& scene, const Part& part, std::v
   const std::vector<PartFeature> nominal = visible_features(part, PrimitiveType::plane, 8);
   for (const SceneFeature& f : scene.features) {
     const Primitive& seen = *f.primitive;
-    if (seen.type != PrimitiveType::plane || is_background(f, part)) continue;
+    if (seen.type != PrimitiveType::plane) continue;
     for (const PartFeature& n : nominal) {
       const Primitive& face = *n.primitive;
       if (seen.area_mm2 > 1.3 * face.area_mm2 || seen.area_mm2 < 0.05 * face.area_mm2) continue;

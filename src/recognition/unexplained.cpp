@@ -14,52 +14,6 @@ double mean_view_area(const Part& part) {
   return sum / static_cast<double>(part.views.size());
 }
 
-/// Is one plane the other's going on, behind what stands in front? By the part's thickness nothing else is: 1 % of the
-/// diameter where the planes are, and 3 deg, what a warped wall bends and a small piece's normal is unsure by.
-bool goes_on_in(const SceneFeature& f, const SceneFeature& g, const Part& part) {
-  const double off = 0.01 * part.diameter_mm;
-  return f.primitive->axis.dot(g.primitive->axis) > std::cos(3 * kDegree) &&
-         std::abs(f.primitive->axis.dot(g.centroid - f.centroid)) < off &&
-         std::abs(g.primitive->axis.dot(f.centroid - g.centroid)) < off;
-}
-
-/// Ids of the primitives that are too large for the part, as flags. A wall that parts hide here and there is seen in
-/// pieces, each small enough for a part: upright planes that go on in each other over more than a part are one. Not
-/// level ones, for plates that lie side by side have their upper faces in one plane.
-std::vector<bool> background_flags(const SceneFeatures& scene, const Part& part) {
-  std::vector<bool> background(scene.primitives->items.size() + 1, false);
-  const SceneFeature* floor = nullptr;
-  for (const SceneFeature& f : scene.features) {
-    if (!is_background(f, part)) continue;
-    background[static_cast<std::size_t>(f.primitive->id)] = true;
-    if (f.primitive->type == PrimitiveType::plane &&
-        (floor == nullptr || f.primitive->surfels.size() > floor->primitive->surfels.size()))
-      floor = &f;
-  }
-  if (floor == nullptr) return background;
-  std::vector<const SceneFeature*> upright;
-  constexpr double kDraft = 20 * kDegree;  // of the walls of bins
-  for (const SceneFeature& f : scene.features)
-    if (f.primitive->type == PrimitiveType::plane &&
-        std::abs(f.primitive->axis.dot(floor->primitive->axis)) < std::sin(kDraft))
-      upright.push_back(&f);
-  for (const SceneFeature* f : upright)
-    for (const SceneFeature* g : upright) {
-      const double reach = 0.5 * ((f->centroid - g->centroid).norm() + f->reach_mm + g->reach_mm);
-      if (f != g && goes_on_in(*f, *g, part) && reach > 1.1 * part.diameter_mm)
-        background[static_cast<std::size_t>(f->primitive->id)] = true;
-    }
-  return background;
-}
-
-/// Local sd of z at a cell [mm].
-double local_sigma(const Surfels& surfels, std::size_t cell) {
-  const Image<float>& tiles = surfels.local_sigma_mm;
-  const int i = static_cast<int>(cell) % surfels.surfel_of_cell.width,
-            j = static_cast<int>(cell) / surfels.surfel_of_cell.width;
-  return tiles(std::min(i / 8, tiles.width - 1), std::min(j / 8, tiles.height - 1));
-}
-
 /// A crumb is less than a seventh of what the part shows on average: the rim of something explained.
 double least_piece_mm2(const Part& part) { return mean_view_area(part) / 7; }
 
@@ -101,25 +55,11 @@ std::vector<std::vector<std::uint32_t>> connected_pieces(const Surfels& surfels,
 
 }  // namespace
 
-Image<std::uint8_t> background_cells(const SceneFeatures& scene, const Part& part) {
-  const std::vector<bool> background = background_flags(scene, part);
-  const Image<std::int32_t>& grid = scene.surfels->surfel_of_cell;
-  Image<std::uint8_t> out(grid.width, grid.height, 0);
-  // Noise that hides 6 % of the part's size (4 sigma) lets everything look like it: such places say nothing of this
-  // part.
-  const double loudest = 0.015 * part.diameter_mm;
-  for (std::size_t i = 0; i < grid.size(); ++i)
-    if (grid.data[i] >= 0)
-      out.data[i] = local_sigma(*scene.surfels, i) > loudest || scene.claimed.holds(i) ||
-                    background[static_cast<std::size_t>(
-                        scene.primitives->label_of_surfel[static_cast<std::size_t>(grid.data[i])])];
-  return out;
-}
-
-std::vector<std::uint32_t> unexplained_surfels(const SceneFeatures& scene, const Part& part) {
+std::vector<std::uint32_t> unexplained_surfels(const SceneFeatures& scene, const Image<std::uint8_t>& background,
+                                               const Part& part) {
   std::vector<std::uint32_t> out;
   for (const std::vector<std::uint32_t>& piece :
-       connected_pieces(*scene.surfels, background_cells(scene, part), least_piece_mm2(part)))
+       connected_pieces(*scene.surfels, background, least_piece_mm2(part)))
     out.insert(out.end(), piece.begin(), piece.end());
   return out;
 }
