@@ -2,6 +2,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "render_scores.hpp"
@@ -20,9 +21,8 @@ Pose turned(const Pose& pose, const ContinuousSymmetry& line, double angle) {
   return pose * turn;
 }
 
-/// Half turns about the faces that most of what is seen belongs to: about the middle of a plane, end for end of a
-/// cylinder. They bring a face onto itself, or nearly, and what would tell may be hidden.
-void add_half_turns(const SceneDepth& scene, const Part& part, const Pose& pose, std::vector<Pose>& out) {
+/// The primitives that at least a quarter of what is seen belongs to.
+std::vector<const Primitive*> mostly_seen(const SceneDepth& scene, const Part& part, const Pose& pose) {
   IndexRender render;
   const int step = step_for(part, scene, pose, kCompareFew);
   render_index(part.render_mesh, scene.camera, pose, step, render);
@@ -38,8 +38,17 @@ void add_half_turns(const SceneDepth& scene, const Part& part, const Pose& pose,
       ++pixels[static_cast<std::size_t>(part.primitive_of_triangle[static_cast<std::size_t>(render.triangle[k])])];
       ++all;
     }
-  for (const Primitive& p : part.model.primitives) {
-    if (4 * pixels[static_cast<std::size_t>(p.id)] < all) continue;
+  std::vector<const Primitive*> out;
+  for (const Primitive& p : part.model.primitives)
+    if (all > 0 && 4 * pixels[static_cast<std::size_t>(p.id)] >= all) out.push_back(&p);
+  return out;
+}
+
+/// Half turns about the faces that most of what is seen belongs to: about the middle of a plane, end for end of a
+/// cylinder. They bring a face onto itself, or nearly, and what would tell may be hidden.
+void add_half_turns(std::span<const Primitive* const> seen, const Pose& pose, std::vector<Pose>& out) {
+  for (const Primitive* face : seen) {
+    const Primitive& p = *face;
     ContinuousSymmetry line;
     line.axis = p.axis;
     line.point = p.point;
@@ -51,6 +60,86 @@ void add_half_turns(const SceneDepth& scene, const Part& part, const Pose& pose,
       continue;
     }
     out.push_back(turned(pose, line, kPi));
+  }
+}
+
+/// A plane face and the rectangle around it along the axes of its second moments.
+struct Rectangle {
+  Eigen::Matrix3d axes;   ///< columns: long side, short side, outward normal
+  Eigen::Vector3d corner; ///< where both sides are least
+  std::array<double, 2> sides{};
+};
+
+Rectangle rectangle_of(const Part& part, const Primitive& face) {
+  std::vector<Eigen::Vector3d> corners;
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d moment = Eigen::Matrix3d::Zero();
+  double area = 0;
+  for (std::size_t t = 0; t < part.mesh.triangles.size(); ++t) {
+    if (part.primitive_of_triangle[t] != face.id) continue;
+    std::array<Eigen::Vector3d, 3> v;
+    for (std::size_t k = 0; k < 3; ++k) v[k] = part.mesh.vertices[part.mesh.triangles[t][k]].cast<double>();
+    corners.insert(corners.end(), v.begin(), v.end());
+    const double a = 0.5 * (v[1] - v[0]).cross(v[2] - v[0]).norm();
+    const Eigen::Vector3d total = v[0] + v[1] + v[2];
+    area += a;
+    sum += a / 3 * total;
+    moment += a / 12 * (total * total.transpose());
+    for (const Eigen::Vector3d& p : v) moment += a / 12 * (p * p.transpose());
+  }
+  Rectangle out;
+  const Eigen::Vector3d n = face.axis, middle = sum / area;
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(moment / area - middle * middle.transpose());
+  const Eigen::Vector3d u = (eigen.eigenvectors().col(2) - n * n.dot(eigen.eigenvectors().col(2))).normalized();
+  out.axes << u, n.cross(u), n;
+  Eigen::Vector3d least = Eigen::Vector3d::Constant(1e30), most = -least;
+  for (const Eigen::Vector3d& p : corners) {
+    least = least.cwiseMin(out.axes.transpose() * p);
+    most = most.cwiseMax(out.axes.transpose() * p);
+  }
+  out.corner = out.axes * least;
+  out.sides = {most.x() - least.x(), most.y() - least.y()};
+  return out;
+}
+
+/// Another of the part's faces, or the same one turned, in the place of one that is seen: flush with each of its
+/// corners, in quarter turns. Of a prism of which one face is seen, the scan may tell which one it is by its outline
+/// only, and a search that has begun with a wrong one does not leave it.
+void add_face_for_face(const Part& part, std::span<const Primitive* const> seen, const Pose& pose,
+                       std::vector<Pose>& out) {
+  constexpr std::size_t kFaces = 8;  // best exposed
+  std::vector<Rectangle> others;
+  for (const PartFeature& f : visible_features(part, PrimitiveType::plane, kFaces))
+    others.push_back(rectangle_of(part, *f.primitive));
+  for (const Primitive* face : seen) {
+    if (face->type != PrimitiveType::plane) continue;
+    const Rectangle own = rectangle_of(part, *face);
+    for (const Rectangle& other : others)
+      for (int quarter = 0; quarter < 4; ++quarter) {
+        // Sides of the other face that come to lie along the first and second side of this one, with their senses.
+        const bool swapped = quarter % 2 == 1;
+        Eigen::Matrix3d axes = other.axes * Eigen::AngleAxisd(0.5 * kPi * quarter, Eigen::Vector3d::UnitZ()).matrix();
+        const std::array<double, 2> sides = {other.sides[swapped], other.sides[!swapped]};
+        // Where both sides are least in the turned axes.
+        Eigen::Vector3d corner = other.corner;
+        const Eigen::Vector3d far = other.corner + other.axes.col(0) * other.sides[0] + other.axes.col(1) * other.sides[1];
+        for (int k = 0; k < 2; ++k) corner += axes.col(k) * std::min(0.0, axes.col(k).dot(far - other.corner));
+        Pose part_from_part;
+        part_from_part.linear() = own.axes * axes.transpose();
+        for (int end = 0; end < 4; ++end) {
+          Eigen::Vector3d to = own.corner;
+          bool twice = false;
+          for (int k = 0; k < 2; ++k) {
+            const double room = own.sides[static_cast<std::size_t>(k)] - sides[static_cast<std::size_t>(k)];
+            if (!(end >> k & 1)) continue;
+            twice = twice || std::abs(room) < 0.01 * part.diameter_mm;
+            to += own.axes.col(k) * room;
+          }
+          if (twice) continue;
+          part_from_part.translation() = to - part_from_part.linear() * corner;
+          out.push_back(pose * part_from_part);
+        }
+      }
   }
 }
 
@@ -153,11 +242,23 @@ std::vector<Pose> rivals(const SceneDepth& scene, const Part& part, const Pose& 
   for (const SelfSimilarPose& s : part.self_similar)
     if (const Pose other = pose * s.part_from_part; score(other, near) > own - kBehind) out.push_back(other);
   // Half turns bring a face onto itself but nearly.
+  const std::vector<const Primitive*> seen = mostly_seen(scene, part, pose);
   std::vector<Pose> halves;
-  add_half_turns(scene, part, pose, halves);
+  add_half_turns(seen, pose, halves);
   const double roughly = 0.05 * part.diameter_mm;
   for (const Pose& other : halves)
     if (score(other, roughly) > own - kBehind) out.push_back(other);
+  if (part.nearly_round.empty()) {
+    std::vector<Pose> faces;
+    add_face_for_face(part, seen, pose, faces);
+    std::vector<std::pair<double, std::size_t>> order;
+    for (std::size_t i = 0; i < faces.size(); ++i)
+      if (const double s = score(faces[i], roughly); s > own - kBehind) order.emplace_back(-s, i);
+    std::sort(order.begin(), order.end());
+    constexpr std::size_t kLikely = 8;
+    if (order.size() > kLikely) order.resize(kLikely);
+    for (const auto& [behind, i] : order) out.push_back(faces[i]);
+  }
   if (part.nearly_round.size() != 1) return out;
   std::vector<Pose> over;
   add_turned_over(part, part.nearly_round[0], pose, over);
