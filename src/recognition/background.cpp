@@ -91,8 +91,7 @@ Border border_of(const SceneFeatures& scene, const Sheet& sheet, const Part& par
         bool going_on = false;
         for (; grid.contains(x, y); x += d[0], y += d[1]) {
           if (grid(x, y) < 0) continue;
-          height = largest.primitive->axis.dot(
-                       surfels.position[static_cast<std::size_t>(grid(x, y))].cast<double>()) -
+          height = largest.primitive->axis.dot(surfels.position[static_cast<std::size_t>(grid(x, y))].cast<double>()) -
                    largest.primitive->offset_mm;
           going_on = own.holds(grid.index(x, y)) || (std::abs(height) < off_plane_mm(part) && ++mixed > kMixed);
           if (going_on || std::abs(height) >= off_plane_mm(part)) break;
@@ -121,8 +120,8 @@ std::vector<bool> background_flags(const SceneFeatures& scene, const Part& part)
   constexpr double kDraft = 20 * kDegree;  // of the walls of bins
   for (const Sheet& sheet : sheets_of(scene, part)) {
     if (sheet.size() < 2 || !larger_than(sheet, part)) continue;
-    const bool upright = floor != nullptr && std::abs(sheet[0]->primitive->axis.dot(floor->primitive->axis)) <
-                                                 std::sin(kDraft);
+    const bool upright =
+        floor != nullptr && std::abs(sheet[0]->primitive->axis.dot(floor->primitive->axis)) < std::sin(kDraft);
     if (upright || border_of(scene, sheet, part).of_floor())
       for (const SceneFeature* f : sheet) flag(*f);
   }

@@ -7,6 +7,7 @@
 #include "likelihood.hpp"
 #include "rivals.hpp"
 #include "tribin/core/parallel.hpp"
+#include "tribin/part/symmetry.hpp"
 #include "tribin/pose/index_render.hpp"
 
 namespace tribin {
@@ -58,6 +59,30 @@ constexpr std::ptrdiff_t kEven = 8;
 bool nothing_tells(const std::vector<Finalist>& finalists) {
   return std::count_if(finalists.begin(), finalists.end(), [](const Finalist& f) { return f.log_likelihood > -1; }) >=
          kEven;
+}
+
+/// Settles poses that nothing tells apart: the first, and of each other side of a nearly round part one. The rest are
+/// these, turned: beside a pose that alone is settled to the noise they would look worse than they are.
+void settle_even(const SceneDepth& scene, const Part& part, int step, std::span<Finalist> finalists) {
+  const SymmetryGroup round = {{}, part.nearly_round};
+  std::vector<std::size_t> settled;
+  std::vector<Pose> before;
+  for (std::size_t i = 0; i < finalists.size(); ++i) {
+    Finalist& f = finalists[i];
+    const auto same = std::find_if(before.begin(), before.end(), [&](const Pose& pose) {
+      return same_placing(part, round, pose, f.pose, 0.02 * part.diameter_mm, 4 * kDegree);
+    });
+    if (part.nearly_round.size() == 1 && same != before.end()) {
+      const ContinuousSymmetry& axis = part.nearly_round[0];
+      const Finalist& side = finalists[settled[static_cast<std::size_t>(same - before.begin())]];
+      f.pose = turned(side.pose, axis, angle_about(axis, same->inverse() * f.pose));
+      f.information = side.information;
+      continue;
+    }
+    settled.push_back(i);
+    before.push_back(f.pose);
+    refine(scene, part, Detail::full, step, 5, 0.012 * part.diameter_mm, std::span(&f, 1));
+  }
 }
 
 }  // namespace
@@ -197,7 +222,7 @@ Polished polish_once(const SceneDepth& scene, std::span<const Part> parts, const
     drop_unlikely(2 * kUndecided, finalists);
   }
   if (nothing_tells(finalists)) {
-    refine(scene, part, Detail::full, fine, 5, 0.012 * part.diameter_mm, std::span(finalists).first(1));
+    settle_even(scene, part, fine, finalists);
   } else if (finalists.size() > 1) {
     refine(scene, part, Detail::full, fine, 5, 0.012 * part.diameter_mm, finalists);
     rank(scene, part, Detail::full, fine, finalists);
@@ -246,7 +271,9 @@ Polished polish(const SceneDepth& scene, std::span<const Part> parts, const Pose
       const Eigen::Vector3d axis = Eigen::Vector3d(line.axis).normalized();
       return (now.linear() * axis).dot(from.camera_from_part.linear() * axis) > std::cos(4 * kDegree);
     });
-    if (is(now) || (compared && spun)) break;
+    // Spins were compared where the part is not, if it went on to explain more by so much.
+    const bool was_there = part.nearly_round.empty() || from.verification.gain > 0.95 * out.candidate.verification.gain;
+    if (was_there && (is(now) || (compared && spun))) break;
     from = out.candidate;
     out = polish_once(scene, parts, from, also);
   }

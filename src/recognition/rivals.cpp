@@ -13,14 +13,6 @@
 namespace tribin {
 namespace {
 
-/// The pose turned about a line of the part.
-Pose turned(const Pose& pose, const ContinuousSymmetry& line, double angle) {
-  Pose turn = Pose::Identity();
-  turn.linear() = Eigen::AngleAxisd(angle, Eigen::Vector3d(line.axis).normalized()).toRotationMatrix();
-  turn.translation() = Eigen::Vector3d(line.point) - turn.linear() * Eigen::Vector3d(line.point);
-  return pose * turn;
-}
-
 /// The primitives that at least a quarter of what is seen belongs to.
 std::vector<const Primitive*> mostly_seen(const SceneDepth& scene, const Part& part, const Pose& pose) {
   IndexRender render;
@@ -65,8 +57,8 @@ void add_half_turns(std::span<const Primitive* const> seen, const Pose& pose, st
 
 /// A plane face and the rectangle around it along the axes of its second moments.
 struct Rectangle {
-  Eigen::Matrix3d axes;   ///< columns: long side, short side, outward normal
-  Eigen::Vector3d corner; ///< where both sides are least
+  Eigen::Matrix3d axes;    ///< columns: long side, short side, outward normal
+  Eigen::Vector3d corner;  ///< where both sides are least
   std::array<double, 2> sides{};
 };
 
@@ -122,7 +114,8 @@ void add_face_for_face(const Part& part, std::span<const Primitive* const> seen,
         const std::array<double, 2> sides = {other.sides[swapped], other.sides[!swapped]};
         // Where both sides are least in the turned axes.
         Eigen::Vector3d corner = other.corner;
-        const Eigen::Vector3d far = other.corner + other.axes.col(0) * other.sides[0] + other.axes.col(1) * other.sides[1];
+        const Eigen::Vector3d far =
+            other.corner + other.axes.col(0) * other.sides[0] + other.axes.col(1) * other.sides[1];
         for (int k = 0; k < 2; ++k) corner += axes.col(k) * std::min(0.0, axes.col(k).dot(far - other.corner));
         Pose part_from_part;
         part_from_part.linear() = own.axes * axes.transpose();
@@ -165,7 +158,40 @@ void add_turned_over(const Part& part, const ContinuousSymmetry& axis, const Pos
     }
 }
 
+/// Where a function on a circle is largest around. Where it is level, because what would tell is hidden, one of
+/// `every` stands for its neighbours.
+std::vector<int> maxima_around(std::span<const double> score, int every) {
+  const auto n = static_cast<int>(score.size());
+  const auto at = [&](int i) { return score[static_cast<std::size_t>((i % n + n) % n)]; };
+  std::vector<int> out;
+  for (int k = 0; k < n; ++k) {
+    if (at(k) <= at(k - 1)) continue;
+    int end = k + 1;
+    while (at(end) == at(k)) ++end;
+    if (at(end) > at(k)) continue;
+    for (int i = k; i < end; i += every) out.push_back(i % n);
+  }
+  if (std::all_of(score.begin(), score.end(), [&](double s) { return s == score[0]; }))
+    for (int k = 0; k < n; k += every) out.push_back(k);
+  return out;
+}
+
 }  // namespace
+
+Pose turned(const Pose& pose, const ContinuousSymmetry& line, double angle) {
+  Pose turn = Pose::Identity();
+  turn.linear() = Eigen::AngleAxisd(angle, Eigen::Vector3d(line.axis).normalized()).toRotationMatrix();
+  turn.translation() = Eigen::Vector3d(line.point) - turn.linear() * Eigen::Vector3d(line.point);
+  return pose * turn;
+}
+
+double angle_about(const ContinuousSymmetry& line, const Pose& motion) {
+  const Vec3 axis = line.axis.normalized();
+  Vec3 u, v;
+  orthonormal_basis(axis, u, v);
+  const Vec3 to = motion.linear() * Eigen::Vector3d(u);
+  return std::atan2(axis.dot(u.cross(to)), u.dot(to));
+}
 
 // A search on the likelihood, because ICP slides past the small features that decide. (The view's points instead of
 // renders rank the right spin behind the eighth in 15 % of the cases, renders in 2 %.)
@@ -179,11 +205,8 @@ std::vector<Pose> spins(const SceneDepth& scene, const Part& part, const Pose& p
     std::vector<Pose> turns;
     for (int k = 0; k < kSpins; ++k) turns.push_back(turned(pose, axis, 2 * kPi * k / kSpins));
     std::vector<double> score = render_scores(scene, part, Detail::coarse, turns, few);
-    std::vector<int> maxima;
-    for (int k = 1; k < kSpins; ++k) {
-      const auto at = [&](int i) { return score[static_cast<std::size_t>((i + kSpins) % kSpins)]; };
-      if (at(k) >= at(k - 1) && at(k) > at(k + 1)) maxima.push_back(k);
-    }
+    std::vector<int> maxima = maxima_around(score, kSpins / static_cast<int>(kLooked));
+    std::erase(maxima, 0);  // the pose itself
     const auto best_first = [&] {
       std::stable_sort(maxima.begin(), maxima.end(), [&](int a, int b) {
         return score[static_cast<std::size_t>(a)] > score[static_cast<std::size_t>(b)];
@@ -273,8 +296,14 @@ std::vector<Pose> rivals(const SceneDepth& scene, const Part& part, const Pose& 
                     [&](const Pose& side) { return same_placing(part, round, side, other, near, 4 * kDegree); }))
       continue;
     sides.push_back(other);
+    // The spin search wants a place that is right to the noise.
+    const int few = step_for(part, scene, other, kCompareFew);
+    RefineOptions options =
+        refine_options(part, Detail::coarse, few, 3, std::max(0.012 * part.diameter_mm, 4 * scene.median_sigma_mm));
+    options.outlines = true;
+    const Pose side = refine_guarded(part, Detail::coarse, scene, other, options).camera_from_part;
     constexpr std::size_t kLikeliest = 2;
-    for (const Pose& spin : spins(scene, part, other, kLikeliest)) settled.push_back(spin);
+    for (const Pose& spin : spins(scene, part, side, kLikeliest)) settled.push_back(spin);
   }
   return settled;
 }

@@ -12,6 +12,12 @@ inline constexpr double kCompareFew = 1000;  // and those that all its rivals ar
 // Poses that a comparison leaves within so many nats are compared again on all pixels.
 inline constexpr double kUndecided = 30;
 
+/// The pose turned about a line of the part.
+Pose turned(const Pose& pose, const ContinuousSymmetry& line, double angle);
+/// By what angle a motion of the part turns about a line: the inverse of `turned`, for motions that are near such
+/// turns.
+double angle_about(const ContinuousSymmetry& line, const Pose& motion);
+
 /// Poses that the part's own shape confuses with this one: self-similar ones, half turns about the faces that are seen.
 /// Of a nearly round part the other sides only, at their own likeliest spins.
 std::vector<Pose> rivals(const SceneDepth& scene, const Part& part, const Pose& pose);

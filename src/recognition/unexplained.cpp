@@ -58,8 +58,7 @@ std::vector<std::vector<std::uint32_t>> connected_pieces(const Surfels& surfels,
 std::vector<std::uint32_t> unexplained_surfels(const SceneFeatures& scene, const Image<std::uint8_t>& background,
                                                const Part& part) {
   std::vector<std::uint32_t> out;
-  for (const std::vector<std::uint32_t>& piece :
-       connected_pieces(*scene.surfels, background, least_piece_mm2(part)))
+  for (const std::vector<std::uint32_t>& piece : connected_pieces(*scene.surfels, background, least_piece_mm2(part)))
     out.insert(out.end(), piece.begin(), piece.end());
   return out;
 }
