@@ -137,8 +137,11 @@ ContourSums contour_sums(const RenderMesh& mesh, const SceneDepth& scene, const 
   // A shade is as wide as what throws it is high.
   const int across = std::max(render.width, render.height) * render.step / 2;
   const int rim = scene.rim(1);
-  const double edge_variance = kEdgeSigmaPx * kEdgeSigmaPx + scene.edge_blur_px * scene.edge_blur_px;
-  double squares = 0, weights = 0;
+  // Where steps are drawn out an edge is known to half of the blur, and neighbours within two blurs share their error.
+  const double blur = scene.edge_blur_px, edge_variance = kEdgeSigmaPx * kEdgeSigmaPx + 0.25 * blur * blur;
+  const double sample_weight = kSampleWeight / (1 + 2 * blur);
+  double squares = 0, weights = 0, outward_weight = 0, outward_pull = 0;
+  Eigen::Matrix<double, 6, 1> outward = Eigen::Matrix<double, 6, 1>::Zero();
   Eigen::Matrix<double, 6, 6> h = Eigen::Matrix<double, 6, 6>::Zero();
   Eigen::Matrix<double, 6, 1> b = Eigen::Matrix<double, 6, 1>::Zero();
   thread_local std::vector<SilhouetteEdge> silhouette;
@@ -155,7 +158,7 @@ ContourSums contour_sums(const RenderMesh& mesh, const SceneDepth& scene, const 
     const double length = along.norm();
     if (length < 1e-6) continue;
     const int count = std::max(1, static_cast<int>(length / render.step));
-    const double weight = kSampleWeight * length / count;
+    const double weight = sample_weight * length / count;
     along /= length;
     const Vec2 m(-along[1], along[0]);  // outward: the facet turns left of its edges, seen with y down
     const double z0 = q0.z(), z1 = q1.z();
@@ -211,10 +214,19 @@ ContourSums contour_sums(const RenderMesh& mesh, const SceneDepth& scene, const 
       const double wt = weight * robust / edge_variance;
       h += wt * jac * jac.transpose();
       b += wt * jac * s;
+      outward += wt * jac;
+      outward_weight += wt;
+      outward_pull += wt * s;
       squares += weight * robust * s * s;
       weights += weight * robust;
       ++out.samples;
     }
+  }
+  if (blur > 0 && outward_weight > 0) {
+    // Such a sensor draws all edges outwards, or inwards, by up to the blur: what they have in common is not the pose.
+    const double known = 1 / (outward_weight + 1 / (blur * blur));
+    h -= known * outward * outward.transpose();
+    b -= known * outward * outward_pull;
   }
   out.information = h;
   out.pull = b;

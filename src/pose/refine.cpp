@@ -47,9 +47,6 @@ Vec6 solve(const System& s, double weak_mm) {
 constexpr double kOutlineBiasPx = 0.1;
 constexpr double kEdgeReachPx = 6;
 
-/// A sensor that draws its edges out draws all of them outwards, or inwards, by up to half of the blur.
-double outline_bias_px(const SceneDepth& scene) { return std::hypot(kOutlineBiasPx, 0.5 * scene.edge_blur_px); }
-
 /// Adds the outline's equations, bounded to a precision of `bias_mm` (0 = unbounded).
 void add_outlines(Matrix6& information, Vector6& b, const ContourSums& edges, const std::vector<Vector6>& frozen,
                   const Vec6& scale, double bias_mm) {
@@ -133,7 +130,7 @@ Refinement refine_pose(const RenderMesh& mesh, const SceneDepth& scene, const Po
     if (options.outlines) {
       const bool settling = it + 2 < options.iterations;
       add_outlines(out.information, b, edges, options.frozen, scale6,
-                   settling ? 0 : outline_bias_px(scene) * center.z() / scene.camera.fx);
+                   settling ? 0 : kOutlineBiasPx * center.z() / scene.camera.fx);
     }
     if (final_pass) break;
     const double spread = kernel / options.kernel_sigmas;

@@ -26,6 +26,10 @@ struct Look {
   double in_limit = 0;  ///< the residual over what is still supported
 };
 
+/// What is still the surface. Mirrored light throws single pixels up to five sigma off; a sensor that draws steps out
+/// takes each depth from many pixels, and what is off by more than four sigma well inside an outline is something else.
+double supported_sigmas(const SceneDepth& scene) { return scene.edge_blur_px > 0 ? 4 : 5; }
+
 Look look_at(const SceneDepth& scene, const IndexRender& render, const VerificationOptions& options, int i, int j) {
   const double near_mm = 0.03 * options.diameter_mm;  // nearer than this an occluder would touch: it is a misfit
   const std::size_t k = render.index(i, j);
@@ -40,7 +44,7 @@ Look look_at(const SceneDepth& scene, const IndexRender& render, const Verificat
   const float z = scene.z_mm(u, v);
   if (!(z > 0)) return out;
   const double r = (z - z_model) * slant;
-  const double tau = std::max(5 * out.sigma_mm, options.tolerance_mm);
+  const double tau = std::max(supported_sigmas(scene) * out.sigma_mm, options.tolerance_mm);
   out.in_sigma = r / out.sigma_mm;
   out.in_limit = r / tau;
   if (std::abs(r) <= tau)
@@ -92,6 +96,8 @@ Verification verify_pose(const RenderMesh& mesh, const SceneDepth& scene, const 
   Verification out;
   out.step_px = options.step_px;
   const int rim = scene.rim(options.step_px);
+  // Without outliers the last that is supported is worth as little as a misfit.
+  const double off_costs = rim > 0 ? 2 : 0.5;
   double gain = 0, squares = 0;
   for (int j = 0; j < render.height; ++j)
     for (int i = 0; i < render.width; ++i) {
@@ -104,7 +110,7 @@ Verification verify_pose(const RenderMesh& mesh, const SceneDepth& scene, const 
       switch (look.seen) {
         case Seen::supported:
           ++out.supported;
-          gain += 1 - 0.5 * look.in_limit * look.in_limit;
+          gain += 1 - off_costs * look.in_limit * look.in_limit;
           squares += look.in_sigma * look.in_sigma;
           break;
         case Seen::misfit:

@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "tribin/core/parallel.hpp"
+#include "tribin/pose/drawn_out.hpp"
 #include "tribin/pose/index_render.hpp"
 
 namespace tribin {
@@ -15,10 +16,40 @@ constexpr float kUnexplained = 0.5f * 16;  // 4 sigma, and what a pixel costs th
 /// What a rendered pose says of the pixels that are measured.
 struct Prediction {
   int u0 = 0, v0 = 0, width = 0, height = 0;
-  int i0 = 0, j0 = 0;           ///< its first pixel in the common window
-  std::vector<float> error_mm;  ///< measured minus predicted, along the surface's normal; > 0 behind it
-  std::vector<float> sigma_mm;  ///< 0 = nothing measured, or no surface there
+  int i0 = 0, j0 = 0;                 ///< its first pixel in the common window
+  std::vector<float> error_mm;        ///< measured minus predicted, along the surface's normal; > 0 behind it
+  std::vector<float> sigma_mm;        ///< 0 = nothing measured, or no surface there
+  std::vector<std::uint8_t> covered;  ///< by the part; else its drawn-out edge. Empty = all that it says anything of
+
+  bool covers(std::size_t k) const { return sigma_mm[k] > 0 && (covered.empty() || covered[k]); }
 };
+
+/// The same where the sensor draws steps out: along outlines the part and what lies beyond, blurred into each other.
+Prediction with_drawn_out_edges(const SceneDepth& scene, const Prediction& sharp, const DrawnOut& edges, int step_px) {
+  Prediction out;
+  out.u0 = sharp.u0 - edges.left * step_px, out.v0 = sharp.v0 - edges.top * step_px;
+  out.width = edges.width, out.height = edges.height;
+  out.error_mm.assign(edges.z_mm.size(), 0);
+  out.sigma_mm.assign(edges.z_mm.size(), 0);
+  out.covered.assign(edges.z_mm.size(), 0);
+  for (int j = 0; j < sharp.height; ++j)
+    for (int i = 0; i < sharp.width; ++i) {
+      const std::size_t from = static_cast<std::size_t>(j) * static_cast<std::size_t>(sharp.width) + i,
+                        to = edges.index(i + edges.left, j + edges.top);
+      out.error_mm[to] = sharp.error_mm[from];
+      out.sigma_mm[to] = sharp.sigma_mm[from];
+      out.covered[to] = sharp.sigma_mm[from] > 0;
+    }
+  for (int j = 0; j < out.height; ++j)
+    for (int i = 0; i < out.width; ++i) {
+      const std::size_t k = edges.index(i, j);
+      const int u = out.u0 + i * step_px, v = out.v0 + j * step_px;
+      if (!(edges.z_mm[k] > 0) || !(scene.z_mm(u, v) > 0)) continue;
+      out.error_mm[k] = scene.z_mm(u, v) - edges.z_mm[k];
+      out.sigma_mm[k] = std::hypot(scene.sigma_mm(u, v), edges.sigma_mm[k]);
+    }
+  return out;
+}
 
 Prediction predict(const SceneDepth& scene, const Part& part, Detail detail, const Pose& pose, int step_px) {
   thread_local IndexRender render;
@@ -45,6 +76,8 @@ Prediction predict(const SceneDepth& scene, const Part& part, Detail detail, con
       out.sigma_mm[k] = std::sqrt(sigma * sigma + cad_sigma * cad_sigma);
     }
   }
+  if (scene.edge_blur_px > 0 && render.width > 0)
+    return with_drawn_out_edges(scene, out, draw_out(scene, render), step_px);
   return out;
 }
 
@@ -83,7 +116,8 @@ struct Predictions {
 
 /// What one prediction says of a pixel.
 struct Look {
-  bool any = false;  ///< a surface is there
+  bool any = false;      ///< a surface is there, or its edge
+  bool covered = false;  ///< the surface
   float error_mm = 0, sigma_mm = 1;
 
   /// \param i, j  of the common window
@@ -94,6 +128,7 @@ struct Look {
         static_cast<std::size_t>(j) * static_cast<std::size_t>(p.width) + static_cast<std::size_t>(i);
     if (!(p.sigma_mm[at] > 0)) return;
     any = true;
+    covered = p.covers(at);
     error_mm = p.error_mm[at];
     sigma_mm = p.sigma_mm[at];
   }
@@ -123,7 +158,7 @@ std::vector<double> likelihoods_of(const Predictions& all) {
     for (int j = 0; j < p.height; ++j) {
       const std::size_t own = static_cast<std::size_t>(j) * static_cast<std::size_t>(p.width);
       const std::size_t row = any.index(p.i0, p.j0 + j);
-      for (std::size_t i = 0; i < static_cast<std::size_t>(p.width); ++i) any.data[row + i] |= p.sigma_mm[own + i] > 0;
+      for (std::size_t i = 0; i < static_cast<std::size_t>(p.width); ++i) any.data[row + i] |= p.covers(own + i);
     }
   std::size_t judged = 0;
   for (const std::uint8_t a : any.data) judged += a;
@@ -133,6 +168,8 @@ std::vector<double> likelihoods_of(const Predictions& all) {
     double sum = kUnexplained * static_cast<double>(judged);
     for (std::size_t k = 0; k < p.sigma_mm.size(); ++k) {
       if (!(p.sigma_mm[k] > 0)) continue;
+      if (!p.covered.empty() && !any(p.i0 + static_cast<int>(k) % p.width, p.j0 + static_cast<int>(k) / p.width))
+        continue;
       const float e = p.error_mm[k] / p.sigma_mm[k];
       sum -= std::max(0.f, kUnexplained - 0.5f * e * e);
     }
@@ -195,7 +232,7 @@ std::vector<double> odds_of(const SceneDepth& scene, const Predictions& all, con
     for (int j = 0; j < height; ++j)
       for (int i = 0; i < width; ++i) {
         const Look first = look(0, i, j), other = look(k, i, j);
-        if (!first.any && !other.any) continue;
+        if (!first.covered && !other.covered) continue;
         if (elsewhere.count > 0) {
           const int cu = (all.u0 + i * all.step_px) / scene.cell_px, cv = (all.v0 + j * all.step_px) / scene.cell_px;
           if (elsewhere.holds(static_cast<std::size_t>(cv) * static_cast<std::size_t>(scene.cell_normal.width) +

@@ -120,14 +120,16 @@ Answer make_answer(const Polished& p, const LastWord& last, double shared_mm2, s
   describe_uncertainty(part, Matrix6(field + last.errors.systematic), last.refined, out);
 
   // Self-similar poses: those that keep 1 % are told. Of those that nobody tells apart the likeliest stands for all:
-  // how many were tried says nothing.
+  // how many were tried says nothing. What is nearer than what counts as found is the same answer: how far that may be
+  // off, its covariance tells.
+  constexpr double kSameAnswer = 0.05;  // of the diameter at the rim, half a diameter from the centre
   const SymmetryGroup same = all_symmetries(part);
   std::vector<std::pair<Pose, double>> apart;
   for (const auto& [pose, log_odds] : p.others) {
     const auto is = [&, &tried = pose](const Pose& other) {
       return same_placing(part, same, other, tried, 0.02 * part.diameter_mm, 4 * kDegree);
     };
-    if (!is(out.camera_from_part) &&
+    if (!same_placing(part, same, out.camera_from_part, pose, kSameAnswer * part.diameter_mm, 2 * kSameAnswer) &&
         std::none_of(apart.begin(), apart.end(), [&](const auto& a) { return is(a.first); }))
       apart.emplace_back(pose, log_odds);
   }
@@ -147,9 +149,8 @@ Answer make_answer(const Polished& p, const LastWord& last, double shared_mm2, s
   const Verification& v = p.candidate.verification;
   out.visible_fraction = v.visible_fraction();
   const auto [place, turn] = predicted_errors(part, out);
-  // "Found" is 5 % of the diameter at the rim, half a diameter from the centre.
   answer.place = probability(v) / (1 + p.class_odds);
-  answer.held = probability_below(0.05 * part.diameter_mm, std::hypot(place, turn * 0.5 * part.diameter_mm));
+  answer.held = probability_below(kSameAnswer * part.diameter_mm, std::hypot(place, turn * 0.5 * part.diameter_mm));
   out.score = answer.place * answer.held * share_of_first(out);
   if (recognition.tolerance_mm > 0 || recognition.tolerance_rad > 0) {
     double within = out.score;

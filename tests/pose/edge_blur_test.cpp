@@ -113,7 +113,7 @@ TEST(VerifyPose, WhatTheSensorDrawsOutSpeaksNeitherForNorAgainst) {
       EXPECT_GT(right.support(), 0.95);
       EXPECT_GT(right.contour(), 0.95);
       EXPECT_LT(right.free_space(), 0.01);
-      EXPECT_GT(right.outline, 50);
+      EXPECT_GT(right.outline, 40);
       // A plate pushed into the floor: no blur makes an outline of it.
       Pose in_floor = Pose::Identity();
       in_floor.translation() = Eigen::Vector3d(-130, 0, -kFloor);

@@ -15,7 +15,7 @@ struct VerificationOptions {
 
 /// What each pixel of a rendered pose says, and what the outline says.
 struct Verification {
-  int pixels = 0;     ///< of the silhouette inside the image
+  int pixels = 0;     ///< of the silhouette inside the image, without what a sensor that draws steps out mixes there
   int supported = 0;  ///< the scan is at the surface, within 5 sigma
   int misfit = 0;     ///< the scan is near the surface, but not at it
   int violated = 0;   ///< the scan is far behind: the camera sees through the part
