@@ -127,6 +127,22 @@ void find_silhouette(const RenderMesh& mesh, const Vec3f& eye, std::vector<Silho
 
 }  // namespace
 
+ContourSums ContourSums::without_common(double share) const {
+  ContourSums out = *this;
+  out.information *= share;
+  out.pull *= share;
+  if (!(common_px > 0)) return out;
+  const double known = share * share / (share * outward_weight + 1 / (common_px * common_px));
+  out.information -= known * outward * outward.transpose();
+  out.pull -= known * outward_pull * outward;
+  return out;
+}
+
+void ContourSums::move(const Vector6& step) {
+  pull -= information * step;
+  outward_pull -= outward.dot(step);
+}
+
 ContourSums contour_sums(const RenderMesh& mesh, const SceneDepth& scene, const Pose& camera_from_part,
                          const IndexRender& render, const Vec3& center, double reach_px) {
   ContourSums out;
@@ -139,7 +155,8 @@ ContourSums contour_sums(const RenderMesh& mesh, const SceneDepth& scene, const 
   const int rim = scene.rim(1);
   // Where steps are drawn out an edge is known to half of the blur, and neighbours within two blurs share their error.
   const double blur = scene.edge_blur_px, edge_variance = kEdgeSigmaPx * kEdgeSigmaPx + 0.25 * blur * blur;
-  const double sample_weight = kSampleWeight / (1 + 2 * blur);
+  out.common_px = blur;
+  out.held = kEdgeSigmaPx * kEdgeSigmaPx / edge_variance / (1 + 2 * blur);
   double squares = 0, weights = 0, outward_weight = 0, outward_pull = 0;
   Eigen::Matrix<double, 6, 1> outward = Eigen::Matrix<double, 6, 1>::Zero();
   Eigen::Matrix<double, 6, 6> h = Eigen::Matrix<double, 6, 6>::Zero();
@@ -158,7 +175,7 @@ ContourSums contour_sums(const RenderMesh& mesh, const SceneDepth& scene, const 
     const double length = along.norm();
     if (length < 1e-6) continue;
     const int count = std::max(1, static_cast<int>(length / render.step));
-    const double weight = sample_weight * length / count;
+    const double weight = kSampleWeight * length / count;
     along /= length;
     const Vec2 m(-along[1], along[0]);  // outward: the facet turns left of its edges, seen with y down
     const double z0 = q0.z(), z1 = q1.z();
@@ -188,13 +205,17 @@ ContourSums contour_sums(const RenderMesh& mesh, const SceneDepth& scene, const 
       if (rendered(margin, outside) && 1 / outside - z < 0.01 * z) continue;
       double s = std::nan("");
       if (rim > 0) {
-        // What is seen well inside must be the part.
-        const double in = reach_px + rim;
-        const Vec2 at = q - m * in;
-        const int u = nearest_pixel(at[0]), v = nearest_pixel(at[1]);
-        if (rendered(-in, inside) && scene.z_mm.contains(u, v) &&
-            std::abs(scene.z_mm(u, v) - 1 / inside) < 6 * scene.median_sigma_mm)
-          s = drawn_out_edge(scene, q[0], q[1], m, z, -in, in, across);
+        // From where the part is seen: far inside, if its edge lies there.
+        const double farthest = reach_px + rim;
+        const auto there = [&](double in) {
+          const Vec2 at = q - m * in;
+          const int u = nearest_pixel(at[0]), v = nearest_pixel(at[1]);
+          return rendered(-in, inside) && scene.z_mm.contains(u, v) &&
+                 std::abs(scene.z_mm(u, v) - 1 / inside) < 6 * scene.median_sigma_mm;
+        };
+        double in = rim;
+        while (in <= farthest && !there(in)) ++in;
+        if (in <= farthest) s = drawn_out_edge(scene, q[0], q[1], m, z, -in, farthest, across);
       } else {
         s = edge_along(scene, q[0], q[1], m, plane, reach_px);
       }
@@ -211,7 +232,7 @@ ContourSums contour_sums(const RenderMesh& mesh, const SceneDepth& scene, const 
       Eigen::Matrix<double, 6, 1> jac;
       jac << g, (point - Eigen::Vector3d(center)).cross(g);
       const double robust = 1 / (1 + 0.25 * s * s / edge_variance);  // Cauchy with a scale of two edge sigmas
-      const double wt = weight * robust / edge_variance;
+      const double wt = weight * robust / (kEdgeSigmaPx * kEdgeSigmaPx);
       h += wt * jac * jac.transpose();
       b += wt * jac * s;
       outward += wt * jac;
@@ -222,14 +243,11 @@ ContourSums contour_sums(const RenderMesh& mesh, const SceneDepth& scene, const 
       ++out.samples;
     }
   }
-  if (blur > 0 && outward_weight > 0) {
-    // Such a sensor draws all edges outwards, or inwards, by up to the blur: what they have in common is not the pose.
-    const double known = 1 / (outward_weight + 1 / (blur * blur));
-    h -= known * outward * outward.transpose();
-    b -= known * outward * outward_pull;
-  }
   out.information = h;
   out.pull = b;
+  out.outward = outward;
+  out.outward_weight = outward_weight;
+  out.outward_pull = outward_pull;
   out.rms_px = weights > 0 ? std::sqrt(squares / weights) : 0;
   return out;
 }

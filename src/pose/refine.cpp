@@ -51,11 +51,12 @@ constexpr double kEdgeReachPx = 6;
 void add_outlines(Matrix6& information, Vector6& b, const ContourSums& edges, const std::vector<Vector6>& frozen,
                   const Vec6& scale, double bias_mm) {
   if (edges.samples < 12) return;
-  const System outline = scaled(edges.information, edges.pull, frozen, scale);
+  const ContourSums held = edges.without_common(bias_mm > 0 ? edges.held : 1);
+  const System outline = scaled(held.information, held.pull, frozen, scale);
   const Eigen::SelfAdjointEigenSolver<Mat6> eigen(outline.h);
   const double share = bias_mm > 0 ? std::min(1.0, 1 / (eigen.eigenvalues()(5) * bias_mm * bias_mm)) : 1.0;
-  information += edges.information * share;
-  b += edges.pull * share;
+  information += held.information * share;
+  b += held.pull * share;
 }
 
 /// How far a motion carries the part's surface at most, nearly: its rim is two radii of gyration away [mm].
@@ -142,7 +143,7 @@ Refinement refine_pose(const RenderMesh& mesh, const SceneDepth& scene, const Po
     const double reach = 4 * std::max(scale, end_scale);
     if (length > reach) delta *= reach / length;
     out.camera_from_part = moved_about(out.camera_from_part, center, delta);
-    edges.pull -= edges.information * delta;
+    edges.move(delta);
     scale /= ratio;
     if (length < 1e-5 && scale <= end_scale) {
       // Converged: what is left is the final pass.

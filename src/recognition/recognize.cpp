@@ -251,7 +251,14 @@ Instances recognize(const Primitives& primitives, const PrimitiveModel& observat
   });
   const double shared_mm2 = common_variance(last);
   for (std::size_t i = 0; i < found.size(); ++i) {
-    const Polished& p = found[i];
+    Polished& p = found[i];
+    if (scene.edge_blur_px > 0) {
+      // What such a sensor leaves open the last word may move by more than a rim: it is looked at where it stands now.
+      p.candidate.camera_from_part = last[i].refined.camera_from_part;
+      const Part& part = parts[static_cast<std::size_t>(p.candidate.part)];
+      p.candidate = looked_at_closely(scene, part, p.candidate);
+      if (!acceptable(part, p.candidate, out.rejected)) continue;
+    }
     Answer answer = make_answer(p, last[i], shared_mm2, parts, options);
     Instance& instance = answer.instance;
     const auto kept_back = [&](const char* test, double value, double limit) {
