@@ -1,6 +1,7 @@
 // Real heaps of pipe elbows and couplers (RealSense): which of those that people see whole are found, how the CAD lies
 // on their own points, and what is given out that nobody saw. Wanted: 90 % of the whole ones, 2 mm rms over 60 % of an
-// instance's own points, nothing off the list. usage: campaign_elbows
+// instance's own points, nothing off the list without a picture: a page for each scan is written to
+// build/campaign/elbows. usage: campaign_elbows [SIGMA_MM [CORRELATION_PX]]
 
 #include <algorithm>
 #include <cmath>
@@ -13,6 +14,8 @@
 #include "tribin/io/cad_files.hpp"
 #include "tribin/io/scan_files.hpp"
 #include "tribin/pose/index_render.hpp"
+#include "tribin/pose/scene_depth.hpp"
+#include "tribin/report/report.hpp"
 
 namespace {
 
@@ -103,15 +106,24 @@ int main(int argc, char** argv) {
       seen.push_back({s["name"], s["whole"], scan.input_from_camera.inverse() * at});
     }
     const Found found = find_parts(scan, parts);
-    std::printf("%s: %d x %d, noise %.2f mm correlated over %.1f px, %s\n", scan.source.c_str(), scan.width(),
-                scan.height(), used_sigma(found.surfels), found.surfels.correlation_px, found.status.c_str());
+    std::printf("%s: %d x %d, noise %.2f mm correlated over %.1f px, edges blurred by %.1f px, %s\n",
+                scan.source.c_str(), scan.width(), scan.height(), used_sigma(found.surfels),
+                found.surfels.correlation_px, make_scene_depth(scan, found.surfels).edge_blur_px, found.status.c_str());
+    const auto page =
+        std::filesystem::path("build/campaign/elbows") / std::filesystem::path(scan.source).stem().string();
+    write_locate_report(page, scan, parts, found,
+                        {.command = {}, .files = {scan.source}, .threads = 0, .times = false});
+    // The scan of couplers holds no elbows, and the other way round; which of the two elbows is seen nobody has told.
+    const bool couplers = scan.source.find("180_") != std::string::npos;
     for (const Instance& instance : found.instances.items) {
       const Part& part =
           *std::find_if(parts.begin(), parts.end(), [&](const Part& p) { return p.name == instance.part; });
       Seen* nearest = nullptr;
       double distance = 10;  // of a point on its surface: a quarter of a tube
       for (Seen& s : seen)
-        if (const double d = distance_to(part, instance, s.at); !s.found && d < distance) nearest = &s, distance = d;
+        if (const double d = distance_to(part, instance, s.at);
+            !s.found && d < distance && (part.name == "Pipe_01") == couplers)
+          nearest = &s, distance = d;
       const Overlay overlay = overlay_of(part, scan, instance);
       ++given;
       if (nearest) nearest->found = true;
@@ -120,7 +132,8 @@ int main(int argc, char** argv) {
       const Vec3 c = scan.input_from_camera * instance.camera_from_part * part.box_center();
       std::printf("  %s score %.2f at %.0f %.0f %.0f, overlay %.2f mm rms, %.0f %% measured: %s\n",
                   instance.part.c_str(), instance.score, c.x(), c.y(), c.z(), overlay.rms_mm,
-                  100 * overlay.measured_share, nearest ? nearest->name.c_str() : "NOT ON THE LIST");
+                  100 * overlay.measured_share,
+                  nearest ? nearest->name.c_str() : ("NOT ON THE LIST, see " + (page / "index.html").string()).c_str());
     }
     for (const Instance& instance : found.instances.uncertain)
       std::printf("  uncertain: %s score %.2f\n", instance.part.c_str(), instance.score);
