@@ -50,7 +50,7 @@ Look look_at(const SceneDepth& scene, const IndexRender& render, const Verificat
   if (std::abs(r) <= tau)
     out.seen = Seen::supported;
   else if (r < -tau - near_mm)
-    out.seen = Seen::occluded;
+    out.seen = scene.is_floor(u, v) ? Seen::violated : Seen::occluded;
   else
     out.seen = r > tau + near_mm ? Seen::violated : Seen::misfit;
   return out;

@@ -9,18 +9,21 @@
 namespace tribin {
 namespace {
 
-/// A piece of a part reaches at most its diameter from its own centroid; noise and a merged neighbour add a little.
-double furthest_reach_mm(const Part& part) { return 1.1 * part.diameter_mm; }
+/// What is large and what is small for parts.
+struct Scale {
+  double reach_mm;      ///< what reaches further is no piece of one; noise and a merged neighbour add a tenth
+  double off_plane_mm;  ///< by which nothing goes on in a plane: by less than a part is thick
+};
 
-/// By the part's thickness nothing else goes on in a plane.
-double off_plane_mm(const Part& part) { return 0.01 * part.diameter_mm; }
+/// A piece of a part reaches at most its diameter from its own centroid.
+Scale scale_of(const Part& part) { return {1.1 * part.diameter_mm, 0.01 * part.diameter_mm}; }
 
 /// Is one plane the other's going on, behind what stands in front? Within 3 deg: what a warped wall bends and a small
 /// piece's normal is unsure by.
-bool goes_on_in(const SceneFeature& f, const SceneFeature& g, const Part& part) {
+bool goes_on_in(const SceneFeature& f, const SceneFeature& g, double off_plane_mm) {
   return f.primitive->axis.dot(g.primitive->axis) > std::cos(3 * kDegree) &&
-         std::abs(f.primitive->axis.dot(g.centroid - f.centroid)) < off_plane_mm(part) &&
-         std::abs(g.primitive->axis.dot(f.centroid - g.centroid)) < off_plane_mm(part);
+         std::abs(f.primitive->axis.dot(g.centroid - f.centroid)) < off_plane_mm &&
+         std::abs(g.primitive->axis.dot(f.centroid - g.centroid)) < off_plane_mm;
 }
 
 double reach_together_mm(const SceneFeature& f, const SceneFeature& g) {
@@ -30,7 +33,7 @@ double reach_together_mm(const SceneFeature& f, const SceneFeature& g) {
 using Sheet = std::vector<const SceneFeature*>;
 
 /// The planes of the scan, those that go on in each other together.
-std::vector<Sheet> sheets_of(const SceneFeatures& scene, const Part& part) {
+std::vector<Sheet> sheets_of(const SceneFeatures& scene, double off_plane_mm) {
   Sheet planes;
   for (const SceneFeature& f : scene.features)
     if (f.primitive->type == PrimitiveType::plane) planes.push_back(&f);
@@ -42,17 +45,17 @@ std::vector<Sheet> sheets_of(const SceneFeatures& scene, const Part& part) {
   };
   for (std::size_t i = 0; i < planes.size(); ++i)
     for (std::size_t k = 0; k < i; ++k)
-      if (goes_on_in(*planes[i], *planes[k], part)) root[find(i)] = find(k);
+      if (goes_on_in(*planes[i], *planes[k], off_plane_mm)) root[find(i)] = find(k);
   std::vector<Sheet> sheets(planes.size());
   for (std::size_t i = 0; i < planes.size(); ++i) sheets[find(i)].push_back(planes[i]);
   std::erase_if(sheets, [](const Sheet& s) { return s.empty(); });
   return sheets;
 }
 
-bool larger_than(const Sheet& sheet, const Part& part) {
+bool reaches_further(const Sheet& sheet, double reach_mm) {
   for (const SceneFeature* f : sheet)
     for (const SceneFeature* g : sheet)
-      if (reach_together_mm(*f, *g) > furthest_reach_mm(part)) return true;
+      if (reach_together_mm(*f, *g) > reach_mm) return true;
   return false;
 }
 
@@ -68,7 +71,7 @@ struct Border {
   }
 };
 
-Border border_of(const SceneFeatures& scene, const Sheet& sheet, const Part& part) {
+Border border_of(const SceneFeatures& scene, const Sheet& sheet, double off_plane_mm) {
   const Surfels& surfels = *scene.surfels;
   const Image<std::int32_t>& grid = surfels.surfel_of_cell;
   const SceneFeature& largest =
@@ -88,13 +91,14 @@ Border border_of(const SceneFeatures& scene, const Sheet& sheet, const Part& par
         // Across what is not measured, for a shade is as wide as what throws it is high.
         int mixed = 0, x = i + d[0], y = j + d[1];
         double height = 0;
-        bool going_on = false;
+        // The image's border, where cells have no surfel, is no border of a floor.
+        bool going_on = !grid.contains(i + 3 * d[0], j + 3 * d[1]);
         for (; grid.contains(x, y); x += d[0], y += d[1]) {
           if (grid(x, y) < 0) continue;
           height = largest.primitive->axis.dot(surfels.position[static_cast<std::size_t>(grid(x, y))].cast<double>()) -
                    largest.primitive->offset_mm;
-          going_on = own.holds(grid.index(x, y)) || (std::abs(height) < off_plane_mm(part) && ++mixed > kMixed);
-          if (going_on || std::abs(height) >= off_plane_mm(part)) break;
+          going_on = own.holds(grid.index(x, y)) || (std::abs(height) < off_plane_mm && ++mixed > kMixed);
+          if (going_on || std::abs(height) >= off_plane_mm) break;
         }
         if (going_on) continue;
         ++(!grid.contains(x, y) ? border.nothing : height > 0 ? border.nearer : border.farther);
@@ -103,29 +107,39 @@ Border border_of(const SceneFeatures& scene, const Sheet& sheet, const Part& par
   return border;
 }
 
-/// Ids of the primitives that are too large for the part, as flags. What goes on in pieces over more than a part is one
-/// floor, where no piece ends before something farther away, and one wall, where it stands on what is too large by
-/// itself: plates that lie side by side have their upper faces in one plane, and end before what they lie on.
+/// Ids of the primitives that are too large for the part, as flags. Upright planes that go on in each other over more
+/// than a part are one wall; not level ones, for plates that lie side by side have their upper faces in one plane.
 std::vector<bool> background_flags(const SceneFeatures& scene, const Part& part) {
-  std::vector<bool> background(scene.primitives->items.size() + 1, false);
+  const Scale scale = scale_of(part);
+  std::vector<bool> background = scene.floor;
+  background.resize(scene.primitives->items.size() + 1, false);
   const auto flag = [&](const SceneFeature& f) { background[static_cast<std::size_t>(f.primitive->id)] = true; };
-  const SceneFeature* floor = nullptr;
+  const SceneFeature* ground = nullptr;
   for (const SceneFeature& f : scene.features) {
-    if (f.reach_mm <= furthest_reach_mm(part)) continue;
+    if (f.reach_mm <= scale.reach_mm) continue;
     flag(f);
     if (f.primitive->type == PrimitiveType::plane &&
-        (floor == nullptr || f.primitive->surfels.size() > floor->primitive->surfels.size()))
-      floor = &f;
+        (ground == nullptr || f.primitive->surfels.size() > ground->primitive->surfels.size()))
+      ground = &f;
   }
+  if (ground == nullptr) return background;
   constexpr double kDraft = 20 * kDegree;  // of the walls of bins
-  for (const Sheet& sheet : sheets_of(scene, part)) {
-    if (sheet.size() < 2 || !larger_than(sheet, part)) continue;
-    const bool upright =
-        floor != nullptr && std::abs(sheet[0]->primitive->axis.dot(floor->primitive->axis)) < std::sin(kDraft);
-    if (upright || border_of(scene, sheet, part).of_floor())
+  for (const Sheet& sheet : sheets_of(scene, scale.off_plane_mm))
+    if (sheet.size() > 1 && reaches_further(sheet, scale.reach_mm) &&
+        std::abs(sheet[0]->primitive->axis.dot(ground->primitive->axis)) < std::sin(kDraft))
       for (const SceneFeature* f : sheet) flag(*f);
-  }
   return background;
+}
+
+/// The cells of some primitives, as flags.
+Image<std::uint8_t> cells_of(const SceneFeatures& scene, const std::vector<bool>& primitives) {
+  const Image<std::int32_t>& grid = scene.surfels->surfel_of_cell;
+  Image<std::uint8_t> out(grid.width, grid.height, 0);
+  for (std::size_t i = 0; i < grid.size(); ++i)
+    if (grid.data[i] >= 0)
+      out.data[i] = primitives[static_cast<std::size_t>(
+          scene.primitives->label_of_surfel[static_cast<std::size_t>(grid.data[i])])];
+  return out;
 }
 
 /// Local sd of z at a cell [mm].
@@ -139,18 +153,31 @@ double local_sigma(const Surfels& surfels, std::size_t cell) {
 }  // namespace
 
 Image<std::uint8_t> background_cells(const SceneFeatures& scene, const Part& part) {
-  const std::vector<bool> background = background_flags(scene, part);
   const Image<std::int32_t>& grid = scene.surfels->surfel_of_cell;
-  Image<std::uint8_t> out(grid.width, grid.height, 0);
+  Image<std::uint8_t> out = cells_of(scene, background_flags(scene, part));
   // Noise that hides 6 % of the part's size (4 sigma) lets everything look like it: such places say nothing of this
   // part.
   const double loudest = 0.015 * part.diameter_mm;
   for (std::size_t i = 0; i < grid.size(); ++i)
     if (grid.data[i] >= 0)
-      out.data[i] = local_sigma(*scene.surfels, i) > loudest || scene.claimed.holds(i) ||
-                    background[static_cast<std::size_t>(
-                        scene.primitives->label_of_surfel[static_cast<std::size_t>(grid.data[i])])];
+      out.data[i] = out.data[i] || local_sigma(*scene.surfels, i) > loudest || scene.claimed.holds(i);
   return out;
 }
+
+void find_floors(SceneFeatures& scene, std::span<const Part> parts) {
+  scene.floor.assign(scene.primitives->items.size() + 1, false);
+  // No part has a face that reaches further: what is seen of one is at most all of it.
+  Scale scale = {0, 1e30};
+  for (const Part& part : parts) {
+    scale.off_plane_mm = std::min(scale.off_plane_mm, scale_of(part).off_plane_mm);
+    for (const PartFeature& face : visible_features(part, PrimitiveType::plane, part.model.primitives.size()))
+      scale.reach_mm = std::max(scale.reach_mm, 1.1 * face.reach_mm);
+  }
+  for (const Sheet& sheet : sheets_of(scene, scale.off_plane_mm))
+    if (reaches_further(sheet, scale.reach_mm) && border_of(scene, sheet, scale.off_plane_mm).of_floor())
+      for (const SceneFeature* f : sheet) scene.floor[static_cast<std::size_t>(f->primitive->id)] = true;
+}
+
+Image<std::uint8_t> floor_cells(const SceneFeatures& scene) { return cells_of(scene, scene.floor); }
 
 }  // namespace tribin

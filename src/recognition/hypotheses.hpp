@@ -30,7 +30,8 @@ struct SceneFeatures {
   std::vector<SceneFeature> features;  ///< one a primitive of the observation, same order
   const Surfels* surfels = nullptr;
   const Primitives* primitives = nullptr;
-  CellMask claimed;  ///< cells that an accepted instance explains
+  std::vector<bool> floor;  ///< find_floors: by id of primitive; empty = not looked for
+  CellMask claimed;         ///< cells that an accepted instance explains
   /// Points that were explained since the same search was made last, thinned; none = it is made for the first time, and
   /// looks everywhere. Elsewhere it would end as it did.
   std::optional<std::vector<Vec3f>> fresh;
@@ -61,6 +62,12 @@ std::vector<PartFeature> visible_features(const Part& part, PrimitiveType type, 
 /// Flags the cells of the scan that belong to the background of a part, what is too large to be a piece of it (a table,
 /// a floor, a wall of the bin), or to an accepted instance.
 Image<std::uint8_t> background_cells(const SceneFeatures& scene, const Part& part);
+
+/// Finds floors: planes, in one piece or in many, that reach further than any face of a part and end nowhere before
+/// something farther away.
+void find_floors(SceneFeatures& scene, std::span<const Part> parts);
+/// Flags the cells of floors: no part lies behind them.
+Image<std::uint8_t> floor_cells(const SceneFeatures& scene);
 
 /// The scene without the features that lie in the background: those that hypotheses start from.
 SceneFeatures foreground(const SceneFeatures& scene, const Image<std::uint8_t>& background);

@@ -205,6 +205,8 @@ Instances recognize(const Primitives& primitives, const PrimitiveModel& observat
   SceneDepth scene = make_scene_depth(*surfels.scan, surfels);
   SceneFeatures features = make_scene_features(primitives, observation, surfels);
 
+  find_floors(features, parts);
+  scene.floor = floor_cells(features);
   Image<std::uint8_t> in_bin;
   if (options.bin != nullptr) {
     in_bin = cells_inside(*options.bin, surfels);

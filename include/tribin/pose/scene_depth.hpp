@@ -17,6 +17,8 @@ struct SceneDepth {
   /// 1 where a cell belongs to a surface that is too large for the part looked for (a table, a wall): a face of the
   /// part that lies in it is seen nowhere. Empty = none.
   Image<std::uint8_t> background;
+  /// 1 where a cell belongs to a floor: nothing lies behind it. Empty = none is known.
+  Image<std::uint8_t> floor;
   int cell_px = 1;
   const Surfels* surfels = nullptr;
   double correlation_px = 0;
@@ -37,9 +39,13 @@ struct SceneDepth {
     const int i = u / cell_px, j = v / cell_px;
     return cell_normal.contains(i, j) ? cell_normal(i, j) : Vec3f(Vec3f::Zero());
   }
-  bool is_background(int u, int v) const {
+  bool is_background(int u, int v) const { return flagged(background, u, v); }
+  bool is_floor(int u, int v) const { return flagged(floor, u, v); }
+
+ private:
+  bool flagged(const Image<std::uint8_t>& cells, int u, int v) const {
     const int i = u / cell_px, j = v / cell_px;
-    return background.contains(i, j) && background(i, j);
+    return cells.contains(i, j) && cells(i, j);
   }
 };
 

@@ -18,7 +18,7 @@ struct Verification {
   int pixels = 0;     ///< of the silhouette inside the image, without what a sensor that draws steps out mixes there
   int supported = 0;  ///< the scan is at the surface, within 5 sigma
   int misfit = 0;     ///< the scan is near the surface, but not at it
-  int violated = 0;   ///< the scan is far behind: the camera sees through the part
+  int violated = 0;   ///< the scan is far behind: the camera sees through the part; or the part lies below a floor
   int occluded = 0;   ///< something lies in front
   int no_data = 0;
   double gain = 0;         ///< summed evidence in pixels of the full image: at most one a pixel
