@@ -38,8 +38,9 @@ struct Line {
   }
 };
 
-/// The blur of each step on a line [px].
-void blurs_of(const Line& line, std::vector<float>& out) {
+/// Calls step(begin, end, height, steepest / limit) for each run of steep pairs of one sense.
+template <typename Step>
+void each_step(const Line& line, const Step& step) {
   for (int k = 0; k + 1 < line.size();) {
     const double pitch = line.z(k) / line.focal(), first = line.z(k + 1) - line.z(k);
     if (!(std::abs(first) > kSteep * pitch + 2 * line.sigma(k))) {  // holes too
@@ -55,13 +56,20 @@ void blurs_of(const Line& line, std::vector<float>& out) {
       steepest = std::max(steepest, next);
       ++end;
     }
-    const double height = sign * (line.z(end) - line.z(k)), ratio = steepest / (kSteep * pitch);
-    if (height > std::max(kNoises * line.sigma(k), kPitches * pitch) && ratio > 1 && line.sheet(k, -1, pitch) &&
-        line.sheet(end, 1, pitch))
-      // A Gaussian falls from its peak, the steepest pair, to the limit of steepness within half the run.
-      out.push_back(static_cast<float>(0.5 * (end - k) / std::sqrt(2 * std::log(ratio))));
+    step(k, end, sign * (line.z(end) - line.z(k)), steepest / (kSteep * pitch));
     k = end;
   }
+}
+
+/// The blur of each step on a line [px].
+void blurs_of(const Line& line, std::vector<float>& out) {
+  each_step(line, [&](int begin, int end, double height, double ratio) {
+    const double pitch = line.z(begin) / line.focal();
+    if (height > std::max(kNoises * line.sigma(begin), kPitches * pitch) && ratio > 1 && line.sheet(begin, -1, pitch) &&
+        line.sheet(end, 1, pitch))
+      // A Gaussian falls from its peak, the steepest pair, to the limit of steepness within half the run.
+      out.push_back(static_cast<float>(0.5 * (end - begin) / std::sqrt(2 * std::log(ratio))));
+  });
 }
 
 }  // namespace
@@ -85,6 +93,23 @@ double edge_blur_px(const SceneDepth& scene) {
   const auto middle = blurs.begin() + static_cast<std::ptrdiff_t>(blurs.size() / 2);
   std::nth_element(blurs.begin(), middle, blurs.end());
   return *middle < kSharp ? 0 : *middle;
+}
+
+Image<std::uint8_t> mixed_pixels(const SceneDepth& scene) {
+  if (!(scene.edge_blur_px > 0)) return {};
+  Image<std::uint8_t> out(scene.z_mm.width, scene.z_mm.height, 0);
+  // Half of a drawn-out step is steep; a sd of the blur on either side is what leads over.
+  const int beside = static_cast<int>(std::ceil(scene.edge_blur_px));
+  const auto mark = [&](const Line& line) {
+    each_step(line, [&](int begin, int end, double, double) {
+      for (int k = std::max(0, begin - beside); k <= std::min(line.size() - 1, end + beside); ++k)
+        (line.column ? out(line.at, k) : out(k, line.at)) = 1;
+    });
+  };
+  // One after the other: rows and columns cross.
+  for (int v = 0; v < out.height; ++v) mark({scene, false, v});
+  for (int u = 0; u < out.width; ++u) mark({scene, true, u});
+  return out;
 }
 
 }  // namespace tribin

@@ -70,7 +70,8 @@ void look(const SceneDepth& scene, const FastPose& pose, const Vec3f& point, con
   // A grazing facet says little about depth: no steeper than 72 deg counts.
   const float r = (z - q[2]) * std::max(std::abs(along), 0.3f);
   if (r > tolerance) {
-    ++out.violated;
+    // On a step that is drawn out nothing is looked through.
+    ++(scene.mixed.contains(p.u, p.v) && scene.mixed(p.u, p.v) ? out.no_data : out.violated);
   } else if (r < -tolerance) {
     ++out.occluded;
   } else if (scene.is_background(p.u, p.v)) {

@@ -28,6 +28,7 @@ SceneDepth make_scene_depth(const Scan& scan, const Surfels& surfels) {
     out.median_sigma_mm = tiles[tiles.size() / 2];
   }
   out.edge_blur_px = edge_blur_px(out);
+  out.mixed = mixed_pixels(out);
 
   // A break: a step that no surface below 80 deg of incidence makes between two pixels, and that noise does not make.
   const int w = scan.width(), h = scan.height();

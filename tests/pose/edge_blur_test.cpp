@@ -6,6 +6,7 @@
 
 #include "support/posed_scan.hpp"
 #include "support/solids.hpp"
+#include "tribin/pose/drawn_out.hpp"
 #include "tribin/pose/refine.hpp"
 #include "tribin/pose/verification.hpp"
 
@@ -29,31 +30,11 @@ Pose over_table(unsigned seed) {
   return pose;
 }
 
-/// As stereo over windows draws it: smoothed in depth. The border stays as it is.
-void blur(Image<float>& z, double sd) {
-  const int reach = static_cast<int>(std::ceil(3 * sd));
-  for (const bool along_rows : {true, false}) {
-    const Image<float> from = z;
-    for (int v = 0; v < z.height; ++v)
-      for (int u = 0; u < z.width; ++u) {
-        double sum = 0, weights = 0;
-        for (int k = -reach; k <= reach; ++k) {
-          const int uu = along_rows ? u + k : u, vv = along_rows ? v : v + k;
-          if (!from.contains(uu, vv)) continue;
-          const double w = sd > 0 ? std::exp(-0.5 * k * k / (sd * sd)) : 1;
-          sum += w * from(uu, vv);
-          weights += w;
-        }
-        z(u, v) = static_cast<float>(sum / weights);
-      }
-  }
-}
-
 constexpr double kFloor = -540;
 
 Scan blurred_scan(const std::vector<std::pair<const Mesh*, Pose>>& things, double sd, unsigned seed) {
   Scan scan = test::posed_scan(things, Vec3(0, 0, -1), kFloor, 0, 0, seed, 320, 256);
-  blur(scan.z_mm, sd);
+  test::draw_steps_out(scan.z_mm, sd);
   const std::vector<double> noise = test::correlated_noise(scan.width(), scan.height(), 0.6, seed);
   for (std::size_t i = 0; i < scan.z_mm.size(); ++i) scan.z_mm.data[i] += static_cast<float>(0.3 * noise[i]);
   return scan;
@@ -121,6 +102,44 @@ TEST(VerifyPose, WhatTheSensorDrawsOutSpeaksNeitherForNorAgainst) {
       EXPECT_GT(wrong.support(), 0.97);
       EXPECT_LT(wrong.contour(), 0.05);
     }
+}
+
+TEST(DrawOut, ShowsWhatTheSensorShows) {
+  const Mesh mesh = block();
+  const RenderMesh render_mesh = make_render_mesh(mesh);
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    SCOPED_TRACE(seed);
+    const Pose truth = over_table(seed);
+    const Scan scan = blurred_scan({{&mesh, truth}}, 2.5, seed);
+    const Surfels surfels = surfels_from_scan(scan);
+    const SceneDepth scene = make_scene_depth(scan, surfels);
+    /// Rms of the scan along outlines [mm], and of what it is off in sigmas, at a pose.
+    const auto off = [&](const Pose& pose) {
+      IndexRender render;
+      render_index(render_mesh, scene.camera, pose, 1, render);
+      const DrawnOut edges = draw_out(scene, render);
+      double mm2 = 0, sigma2 = 0, n = 0;
+      for (int j = 0; j < edges.height; ++j)
+        for (int i = 0; i < edges.width; ++i) {
+          const std::size_t k = edges.index(i, j);
+          if (!(edges.z_mm[k] > 0)) continue;
+          const int u = render.u0 - edges.left + i, v = render.v0 - edges.top + j;
+          const double e = scene.z_mm(u, v) - edges.z_mm[k];
+          mm2 += e * e;
+          sigma2 += e * e / (edges.sigma_mm[k] * edges.sigma_mm[k] + 0.3 * 0.3);
+          ++n;
+        }
+      EXPECT_GT(n, 1000);
+      return std::pair{std::sqrt(mm2 / n), std::sqrt(sigma2 / n)};
+    };
+    // Steps of 50 to 110 mm, drawn over ten pixels. The blur is measured to a fifth.
+    EXPECT_LT(off(truth).first, 6);
+    EXPECT_LT(off(truth).second, 1);
+    Pose aside = truth;
+    aside.translation() += Eigen::Vector3d(4 * std::cos(seed), 4 * std::sin(seed), 0);
+    EXPECT_GT(off(aside).first, 2 * off(truth).first);
+    EXPECT_GT(off(aside).second, 1.5 * off(truth).second);
+  }
 }
 
 TEST(RefinePose, FindsAFaceByItsOutlineThoughItIsDrawnOut) {

@@ -41,6 +41,27 @@ TEST(FindParts, TellsTheAlternatorsApartAndWhereTheyAre) {
   }
 }
 
+TEST(FindParts, FindsPartsWhereTheSensorDrawsStepsOut) {
+  const std::vector<Part> parts = {alternator('a'), alternator('b')};
+  for (unsigned seed = 1; seed <= 6; ++seed) {
+    SCOPED_TRACE(seed);
+    const Part& part = parts[seed % 2];
+    const Pose truth = test::random_pose(500, seed);
+    Scan scan = test::posed_scan({{&part.mesh, truth}}, Vec3(0, 0, -1), -620, 0, 0, seed, 400, 320);
+    test::draw_steps_out(scan.z_mm, 2.5);
+    const std::vector<double> noise = test::correlated_noise(scan.width(), scan.height(), 0.6, seed);
+    for (std::size_t i = 0; i < scan.z_mm.size(); ++i) scan.z_mm.data[i] += static_cast<float>(0.3 * noise[i]);
+    const Found found = find_parts(scan, parts);
+    ASSERT_EQ(found.instances.items.size(), 1u);
+    const Instance& instance = found.instances.items[0];
+    EXPECT_EQ(instance.part, part.name);
+    const Eigen::Vector3d c = part.box_center();
+    EXPECT_LT((instance.camera_from_part * c - truth * c).norm(), 1);  // a pixel is 0.9 mm, the blur 2.5
+    EXPECT_LT(rotation_angle(instance.camera_from_part.linear(), truth.linear()), 2 * kDegree);
+    EXPECT_GT(instance.score, 0.9);
+  }
+}
+
 TEST(FindParts, AnEmptyTableHasNoPartsAndReasons) {
   const std::vector<Part> parts = {alternator('a')};
   const Scan scan = test::posed_scan({}, Vec3(0, 0, -1), -800, 0.1, 0.8, 1, 800, 640);

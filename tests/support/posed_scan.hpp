@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <limits>
 #include <utility>
 #include <vector>
@@ -34,6 +35,26 @@ inline Scan posed_scan(const std::vector<std::pair<const Mesh*, Pose>>& things, 
   const std::vector<double> noise = correlated_noise(width, height, correlation_px, seed);
   for (std::size_t i = 0; i < scan.z_mm.size(); ++i) scan.z_mm.data[i] += static_cast<float>(sigma_mm * noise[i]);
   return scan;
+}
+
+/// As stereo over windows draws it: smoothed in depth. The border stays as it is.
+inline void draw_steps_out(Image<float>& z, double sd) {
+  const int reach = static_cast<int>(std::ceil(3 * sd));
+  for (const bool along_rows : {true, false}) {
+    const Image<float> from = z;
+    for (int v = 0; v < z.height; ++v)
+      for (int u = 0; u < z.width; ++u) {
+        double sum = 0, weights = 0;
+        for (int k = -reach; k <= reach; ++k) {
+          const int uu = along_rows ? u + k : u, vv = along_rows ? v : v + k;
+          if (!from.contains(uu, vv)) continue;
+          const double w = sd > 0 ? std::exp(-0.5 * k * k / (sd * sd)) : 1;
+          sum += w * from(uu, vv);
+          weights += w;
+        }
+        z(u, v) = static_cast<float>(sum / weights);
+      }
+  }
 }
 
 /// A pose at a depth, turned by a seeded random rotation.

@@ -16,4 +16,8 @@ namespace tribin {
 /// \source ours.
 double edge_blur_px(const SceneDepth& scene);
 
+/// 1 where a step that is drawn out (by scene.edge_blur_px) leads from one surface to another: the depth there is no
+/// surface's. Empty where steps are sharp.
+Image<std::uint8_t> mixed_pixels(const SceneDepth& scene);
+
 }  // namespace tribin

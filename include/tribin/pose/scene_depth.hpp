@@ -25,6 +25,8 @@ struct SceneDepth {
   double median_sigma_mm = 0;
   double edge_blur_px = 0;  ///< how wide the sensor draws steps of depth (pose/edge_blur.hpp); 0 = as sharp as the grid
 
+  Image<std::uint8_t> mixed;  ///< 1 on steps that are drawn out (mixed_pixels); empty where they are sharp
+
   /// How many rendered pixels beside an outline the scan shows neither this side nor the other: two sd of the blur.
   int rim(int step_px) const { return static_cast<int>(std::ceil(2 * edge_blur_px / step_px)); }
 
