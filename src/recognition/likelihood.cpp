@@ -12,6 +12,9 @@ namespace tribin {
 namespace {
 
 constexpr float kUnexplained = 0.5f * 16;  // 4 sigma, and what a pixel costs that no surface explains
+// And more where a surface should be seen and something else is: it is worse to be refuted than to say nothing.
+// One in twenty of what should be seen is not, for mirrored light and what the part differs from its CAD: 3 nats.
+constexpr float kRefuted = 3;
 
 /// What a rendered pose says of the pixels that are measured.
 struct Prediction {
@@ -20,13 +23,22 @@ struct Prediction {
   std::vector<float> error_mm;        ///< measured minus predicted, along the surface's normal; > 0 behind it
   std::vector<float> sigma_mm;        ///< 0 = nothing measured, or no surface there
   std::vector<std::uint8_t> covered;  ///< by the part; else its drawn-out edge. Empty = all that it says anything of
+  float near_mm = 0;                  ///< what lies farther in front hides the part
 
   bool covers(std::size_t k) const { return sigma_mm[k] > 0 && (covered.empty() || covered[k]); }
+
+  /// [nats]; 0 = at its place.
+  float cost(std::size_t k) const {
+    const float e = error_mm[k] / sigma_mm[k], square = 0.5f * e * e;
+    if (square < kUnexplained) return square;
+    return covers(k) && error_mm[k] > -near_mm ? kUnexplained + kRefuted : kUnexplained;
+  }
 };
 
 /// The same where the sensor draws steps out: along outlines the part and what lies beyond, blurred into each other.
 Prediction with_drawn_out_edges(const SceneDepth& scene, const Prediction& sharp, const DrawnOut& edges, int step_px) {
   Prediction out;
+  out.near_mm = sharp.near_mm;
   out.u0 = sharp.u0 - edges.left * step_px, out.v0 = sharp.v0 - edges.top * step_px;
   out.width = edges.width, out.height = edges.height;
   out.error_mm.assign(edges.z_mm.size(), 0);
@@ -55,6 +67,7 @@ Prediction predict(const SceneDepth& scene, const Part& part, Detail detail, con
   thread_local IndexRender render;
   render_index(mesh_of(part, detail), scene.camera, pose, step_px, render);
   Prediction out;
+  out.near_mm = static_cast<float>(0.03 * part.diameter_mm);  // as in the verification
   out.u0 = render.u0, out.v0 = render.v0, out.width = render.width, out.height = render.height;
   out.error_mm.assign(render.triangle.size(), 0);
   out.sigma_mm.assign(render.triangle.size(), 0);
@@ -119,6 +132,7 @@ struct Look {
   bool any = false;      ///< a surface is there, or its edge
   bool covered = false;  ///< the surface
   float error_mm = 0, sigma_mm = 1;
+  float cost = kUnexplained;  ///< [nats]
 
   /// \param i, j  of the common window
   Look(const Prediction& p, int i, int j) {
@@ -131,11 +145,7 @@ struct Look {
     covered = p.covers(at);
     error_mm = p.error_mm[at];
     sigma_mm = p.sigma_mm[at];
-  }
-  float cost() const {
-    if (!any) return kUnexplained;
-    const float e = error_mm / sigma_mm;
-    return std::min(0.5f * e * e, kUnexplained);
+    cost = p.cost(at);
   }
 };
 
@@ -170,8 +180,7 @@ std::vector<double> likelihoods_of(const Predictions& all) {
       if (!(p.sigma_mm[k] > 0)) continue;
       if (!p.covered.empty() && !any(p.i0 + static_cast<int>(k) % p.width, p.j0 + static_cast<int>(k) / p.width))
         continue;
-      const float e = p.error_mm[k] / p.sigma_mm[k];
-      sum -= std::max(0.f, kUnexplained - 0.5f * e * e);
+      sum -= kUnexplained - p.cost(k);
     }
     out[static_cast<std::size_t>(which)] = -sum;
   });
@@ -242,7 +251,7 @@ std::vector<double> odds_of(const SceneDepth& scene, const Predictions& all, con
         const float sigma = std::max(first.any ? first.sigma_mm : 0, other.any ? other.sigma_mm : 0);
         const float apart = first.any && other.any ? std::abs(first.error_mm - other.error_mm) : 1e9f;
         tells(i, j) = apart > std::max(sigma, common);
-        gain(i, j) = first.cost() - other.cost();
+        gain(i, j) = first.cost - other.cost;
       }
     std::vector<double> votes(static_cast<std::size_t>(patches_x) * patches_y, 0.0);
     for (int j = 1; j + 1 < height; ++j)
