@@ -279,8 +279,14 @@ std::vector<Pose> rivals(const SceneDepth& scene, const Part& part, const Pose& 
       if (const double s = score(faces[i], roughly); s > own - kBehind) order.emplace_back(-s, i);
     std::sort(order.begin(), order.end());
     constexpr std::size_t kLikely = 8;
-    if (order.size() > kLikely) order.resize(kLikely);
-    for (const auto& [behind, i] : order) out.push_back(faces[i]);
+    std::vector<Pose> distinct = {pose};  // equal faces, and a face that is its own, make one pose many times
+    for (std::size_t i = 0; i < order.size() && distinct.size() <= kLikely; ++i) {
+      const Pose& other = faces[order[i].second];
+      if (std::none_of(distinct.begin(), distinct.end(),
+                       [&](const Pose& d) { return close_poses(part, d, other, near, 4 * kDegree); }))
+        distinct.push_back(other);
+    }
+    out.insert(out.end(), distinct.begin() + 1, distinct.end());
   }
   if (part.nearly_round.size() != 1) return out;
   std::vector<Pose> over;
