@@ -1,5 +1,6 @@
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "candidates.hpp"
@@ -21,6 +22,13 @@ double angle_about(const ContinuousSymmetry& line, const Pose& motion);
 /// Poses that the part's own shape confuses with this one: self-similar ones, half turns about the faces that are seen.
 /// Of a nearly round part the other sides only, at their own likeliest spins.
 std::vector<Pose> rivals(const SceneDepth& scene, const Part& part, const Pose& pose);
+
+/// Another of the part's faces, or the same one turned, in the place of one that is seen: flush with each of its
+/// corners, in quarter turns. Of a prism of which one face is seen, the scan may tell which one it is by its outline
+/// only, and a search that has begun with a wrong one does not leave it.
+/// \param seen  the primitives that most of what is seen belongs to.
+void add_face_for_face(const Part& part, std::span<const Primitive* const> seen, const Pose& pose,
+                       std::vector<Pose>& out);
 
 /// Spins about the axes that the part is nearly round about: the best rendered poses over the whole turn, each brought
 /// to its best angle.
