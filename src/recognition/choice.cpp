@@ -154,7 +154,6 @@ bool keeps_limits(const Part& part, const PoseCandidate& candidate, double slack
 Polished polish_once(const SceneDepth& scene, std::span<const Part> parts, const PoseCandidate& settled,
                      std::span<const Pose> also) {
   const Part& part = parts[static_cast<std::size_t>(settled.part)];
-  const double noise = 4 * scene.median_sigma_mm;
   const int few = step_for(part, scene, settled.camera_from_part, kCompareFew);
 
   // Coarse: every rival is settled on few pixels; only those near the best are worth more. The spin search compares
@@ -168,9 +167,7 @@ Polished polish_once(const SceneDepth& scene, std::span<const Part> parts, const
   std::vector<Verification> checks(poses.size());
   parallel_each(static_cast<int>(poses.size()), [&](int i) {
     const auto k = static_cast<std::size_t>(i);
-    RefineOptions options = refine_options(part, Detail::coarse, few, 3, std::max(0.012 * part.diameter_mm, noise));
-    options.outlines = true;
-    if (k > 0) poses[k] = refine_guarded(part, Detail::coarse, scene, poses[k], options).camera_from_part;
+    if (k > 0) poses[k] = settled_on_few(scene, part, poses[k], few);
     checks[k] = verify_pose(part.coarse_mesh, scene, poses[k],
                             verification_options(part, Detail::coarse, few, 0.004 * part.diameter_mm));
   });

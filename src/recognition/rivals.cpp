@@ -93,6 +93,13 @@ double angle_about(const ContinuousSymmetry& line, const Pose& motion) {
   return std::atan2(axis.dot(u.cross(to)), u.dot(to));
 }
 
+Pose settled_on_few(const SceneDepth& scene, const Part& part, const Pose& pose, int step_px) {
+  RefineOptions options =
+      refine_options(part, Detail::coarse, step_px, 3, std::max(0.012 * part.diameter_mm, 4 * scene.median_sigma_mm));
+  options.outlines = true;
+  return refine_guarded(part, Detail::coarse, scene, pose, options).camera_from_part;
+}
+
 std::vector<Pose> rivals(const SceneDepth& scene, const Part& part, const Pose& pose) {
   std::vector<Pose> out;
   const auto score = [&](const Pose& p, double tolerance) {
@@ -143,11 +150,7 @@ std::vector<Pose> rivals(const SceneDepth& scene, const Part& part, const Pose& 
       continue;
     sides.push_back(other);
     // The spin search wants a place that is right to the noise.
-    const int few = step_for(part, scene, other, kCompareFew);
-    RefineOptions options =
-        refine_options(part, Detail::coarse, few, 3, std::max(0.012 * part.diameter_mm, 4 * scene.median_sigma_mm));
-    options.outlines = true;
-    const Pose side = refine_guarded(part, Detail::coarse, scene, other, options).camera_from_part;
+    const Pose side = settled_on_few(scene, part, other, step_for(part, scene, other, kCompareFew));
     constexpr std::size_t kLikeliest = 2;
     for (const Pose& spin : spins(scene, part, side, kLikeliest)) settled.push_back(spin);
   }

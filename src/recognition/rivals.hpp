@@ -19,6 +19,9 @@ Pose turned(const Pose& pose, const ContinuousSymmetry& line, double angle);
 /// turns.
 double angle_about(const ContinuousSymmetry& line, const Pose& motion);
 
+/// The pose after three steps of refinement with outlines on few pixels: near enough to be compared with others.
+Pose settled_on_few(const SceneDepth& scene, const Part& part, const Pose& pose, int step_px);
+
 /// Poses that the part's own shape confuses with this one: self-similar ones, half turns about the faces that are seen.
 /// Of a nearly round part the other sides only, at their own likeliest spins.
 std::vector<Pose> rivals(const SceneDepth& scene, const Part& part, const Pose& pose);
