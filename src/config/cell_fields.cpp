@@ -201,6 +201,18 @@ Fields<Regrasp> regrasp_fields() {
   return fields;
 }
 
+Fields<InHand> in_hand_fields() {
+  Fields<InHand> fields;
+  return fields
+      .value("looks", "", "1 to 6 poses", "required", &InHand::looks,
+             "base_from_flange where the arm shows what it holds: a scan at each; before a fixed camera, clear of the bin",
+             [](const TomlPlace& place) {
+               if (place.array_size("a list of 1 to 6 poses") == 0) place.fail("a list of 1 to 6 poses");
+               return read_way_points(place);
+             })
+      .required();
+}
+
 Fields<Rack> rack_fields() {
   Fields<Rack> fields;
   add_pose(fields, "base_from_rack", &Rack::base_from_rack, "the first slot, z up");

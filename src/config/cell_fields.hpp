@@ -12,6 +12,7 @@ io::Fields<Gripper> gripper_fields();
 io::Fields<CellPart> part_fields();
 io::Fields<Rack> rack_fields();
 io::Fields<Regrasp> regrasp_fields();
+io::Fields<InHand> in_hand_fields();
 io::Fields<CellRobot> robot_fields();
 io::Fields<Safety> safety_fields();
 

@@ -21,6 +21,7 @@ struct Sections {
   std::vector<CellPart> parts;
   std::optional<Rack> rack;
   std::optional<Regrasp> regrasp;
+  std::optional<InHand> in_hand;
   std::vector<CellRobot> robots;
   Safety safety;
 };
@@ -77,6 +78,14 @@ std::vector<std::string> warnings_of(const Sections& s) {
   return out;
 }
 
+/// Only a fixed camera sees what the arm holds before it.
+void check_in_hand(const TomlPlace& top, const Sections& s) {
+  if (!s.in_hand) return;
+  if (s.camera && s.camera->mount == CameraMount::hand)
+    top.at("in_hand").fail("no [in_hand], as the camera's mount is \"hand\"");
+  if (s.robots.size() > 1) top.at("in_hand").fail("no [in_hand], as there are two arms");
+}
+
 /// The pose must be the one that the mount has: the other would be believed in the wrong frame.
 void check_hand_eye(const TomlPlace& top, const Sections& s) {
   const bool hand = s.camera && s.camera->mount == CameraMount::hand;
@@ -97,9 +106,10 @@ Fields<Sections> sections() {
   fields.list("part", config::part_fields(), &Sections::parts, "`[[part]]`, one a CAD file");
   fields.table("rack", config::rack_fields(), &Sections::rack, "where parts are put");
   fields.table("regrasp", config::regrasp_fields(), &Sections::regrasp, "where parts are gripped anew");
+  fields.table("in_hand", config::in_hand_fields(), &Sections::in_hand, "where a part in the hand is measured");
   fields.list("robot", config::robot_fields(), &Sections::robots, "`[[robot]]`, one an arm");
   fields.table("safety", config::safety_fields(), &Sections::safety, "what motion is refused for");
-  return fields.check(check_names).check(check_hand_eye);
+  return fields.check(check_names).check(check_hand_eye).check(check_in_hand);
 }
 
 WorkCell read_cell(const std::filesystem::path& path, const char* wanted) {
@@ -118,6 +128,7 @@ WorkCell read_cell(const std::filesystem::path& path, const char* wanted) {
           std::move(s.parts),
           std::move(s.rack),
           std::move(s.regrasp),
+          std::move(s.in_hand),
           std::move(s.robots),
           std::move(s.safety),
           std::move(warnings)};

@@ -1,6 +1,5 @@
 #include "picking/chooser.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
@@ -17,18 +16,6 @@ constexpr double kTravelGap_mm = 20;  // over all that stands
 
 /// What software refuses of a motion, whatever the controller does.
 bool of_motion(robot::RefusalCode code) { return code >= robot::RefusalCode::not_finite; }
-
-PlaceError error_of(const WorkCell& cell, const Choice& choice) {
-  PlaceError error;
-  const Matrix3 position = choice.part.covariance.topLeftCorner<3, 3>();
-  error.pose = std::sqrt(std::max(
-      0.0, Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(Eigen::Matrix3d(position)).eigenvalues().maxCoeff()));
-  error.hand_eye = cell.hand_eye.sigma_mm;
-  error.robot = cell.robots.front().sigma_mm;  // one controller, one accuracy
-  for (const Gripper& gripper : cell.grippers)
-    if (gripper.name == choice.grasp.gripper) error.grip = gripper.slip_mm;
-  return error;
-}
 
 }  // namespace
 
@@ -189,9 +176,14 @@ std::optional<Placing> Chooser::place(const Entry& held, const Filling& filling,
   std::vector<const Slot*> open;
   std::vector<Pose> stands;
   Slot station;
+  const auto tight = [&](const Slot& slot) {
+    PlaceError error;
+    error.pose = held.sigma_mm, error.robot = cell_.robots.front().sigma_mm;
+    return held.sigma_mm > 0 && too_tight(slot, error, cell_.rack->chamfer_mm);
+  };
   if (where == Where::slots) {
     for (const Slot* slot : open_slots(slots_, filling, cell_.rack->when_missing))
-      if (may_stand(*slot, held.part) && scan_against(*slot, part).empty()) open.push_back(slot);
+      if (may_stand(*slot, held.part) && scan_against(*slot, part).empty() && !tight(*slot)) open.push_back(slot);
     stands = alike(vision_.model(held.part), part.slot_from_part);
   } else if (has_station()) {
     station.base_from_slot = cell_.regrasp->base_from_station;
@@ -199,10 +191,6 @@ std::optional<Placing> Chooser::place(const Entry& held, const Filling& filling,
     for (const Pose& pose : where == Where::station ? std::vector<Pose>{part.slot_from_part} : part.station_from_part)
       for (const Pose& same : alike(vision_.model(held.part), pose)) stands.push_back(same);
   }
-  std::vector<Standing> standing;
-  for (std::size_t i = 0; i < filling.size(); ++i)
-    if (!filling[i].empty())
-      standing.push_back({&vision_.model(filling[i]), slots_[i].base_from_slot * cell_part(filling[i]).slot_from_part});
   const Held in_hand{&vision_.model(held.part), &shape(held.gripper), held.opening_mm, held.tcp_from_part};
   const Pose flange_from_tcp = shape(held.gripper).gripper.flange_from_tcp;
   const auto has_ways = [&](const Placing& p) {
@@ -213,9 +201,17 @@ std::optional<Placing> Chooser::place(const Entry& held, const Filling& filling,
     const Start after{p.stops[2].base_from_tcp * flange_from_tcp.inverse(), p.stops[2].joints};
     return way(after, next_place(held.gripper, after), held.gripper).has_value();
   };
-  auto placing = plan_place(arm_with(held.gripper), in_hand, open, stands, standing, has_ways);
+  auto placing = plan_place(arm_with(held.gripper), in_hand, open, stands, standing(filling), has_ways);
   if (placing && placing->slot == &station) placing->slot = nullptr;
   return placing;
+}
+
+std::vector<Standing> Chooser::standing(const Filling& filling) const {
+  std::vector<Standing> out;
+  for (std::size_t i = 0; i < filling.size(); ++i)
+    if (!filling[i].empty())
+      out.push_back({&vision_.model(filling[i]), slots_[i].base_from_slot * cell_part(filling[i]).slot_from_part});
+  return out;
 }
 
 std::optional<Placing> Chooser::place_after(const grasp::Grasp& grasp, const Filling& filling,
@@ -232,6 +228,9 @@ std::optional<Placing> Chooser::place_after(const grasp::Grasp& grasp, const Fil
     carried = {back->back().base_from_tcp * shape(grasp.gripper).gripper.flange_from_tcp.inverse(),
                back->back().joints};
   }
+  if (cell_.in_hand)
+    if (const auto shown = way_to_show(carried, cell_.in_hand->looks.back(), held, filling))
+      carried = {cell_.in_hand->looks.back(), shown->back().joints};
   return place(held, filling, carried, where);
 }
 
@@ -286,7 +285,7 @@ std::vector<robot::Refusal> Chooser::refusals_of(const Choice& choice, double sc
   if (choice.placing.slot) {
     motion.slot = robot::SlotFacts{false, may_stand(*choice.placing.slot, choice.grasp.part_name)};
     // A slot that is too tight is never right.
-    if (const auto tight = too_tight(*choice.placing.slot, error_of(cell_, choice), cell_.rack->chamfer_mm))
+    if (const auto tight = too_tight(*choice.placing.slot, error_of(choice), cell_.rack->chamfer_mm))
       return {{robot::RefusalCode::slot_class, *tight}};
   }
   std::vector<robot::Refusal> out;

@@ -75,6 +75,16 @@ class Chooser {
   std::optional<std::vector<Stop>> whole_way(const Start& start, const Pose& base_from_tcp, const std::string& gripper,
                                              const Entry* held = nullptr) const;
 
+  /// A part in the hand to where the arm shows it: the last stop is there. None where that is out of reach, or not
+  /// clear of the bin, full to its rim, and of what stands in the rack.
+  std::optional<std::vector<Stop>> way_to_show(const Start& start, const Pose& base_from_flange, const Entry& held,
+                                               const Filling& filling) const;
+  /// How a part is held by a grasp, before a scan of it in the hand. \param covariance  of its pose, as PartHere's
+  Grip grip_of(const std::string& gripper, const Pose& base_from_tcp, const Pose& tcp_from_part,
+               const Matrix6& covariance, bool from_station) const;
+  HeldPose held(const Grip& grip, const std::string& part, std::span<const HandLook> looks,
+                bool believe_grip = true) const;
+
   /// \param held  what the gripper holds then: two arms keep it clear of each other
   ArmWithTool arm_with(const std::string& gripper, const Entry* held = nullptr) const;
   const grasp::GripperShape& shape(const std::string& gripper) const;
@@ -91,6 +101,8 @@ class Chooser {
   std::vector<robot::Refusal> refusals_of(const Choice& choice, double scan_age_s) const;
 
  private:
+  std::vector<Standing> standing(const Filling& filling) const;
+  PlaceError error_of(const Choice& choice) const;
   /// Why a part may not go to a slot, by the last scan; empty = it may. Not asked where the rack does not say so.
   std::string scan_against(const Slot& slot, const CellPart& part) const;
 

@@ -15,7 +15,7 @@ constexpr double kSamePart_mm = 20;  // a part that was missed lies that near to
 }  // namespace
 
 std::string_view name_of(Phase phase) {
-  constexpr std::string_view kNames[] = {"recover", "scan", "choose", "pick", "place", "regrasp", "push", "end"};
+  constexpr std::string_view kNames[] = {"recover", "scan", "choose",  "pick", "show", "place", "regrasp", "push", "end"};
   return kNames[static_cast<int>(phase)];
 }
 
@@ -64,6 +64,9 @@ RunEnd Run::go() {
         break;
       case Phase::pick:
         phase = pick();
+        break;
+      case Phase::show:
+        phase = show();
         break;
       case Phase::place:
         phase = place();
@@ -116,6 +119,7 @@ Phase Run::scan() {
   if (options_.most_parts > 0 && end_.placed >= options_.most_parts)
     return finish("most_parts", std::to_string(end_.placed) + " parts are placed, as many as were asked for");
   scene_ = std::max(scene_, now().last_scene) + 1;
+  step_aside();
   const FlangePose flange = go_to_look();
   scan_s_ = links_.clock->now_s();
   sight_ = links_.vision->scan(flange);
@@ -182,7 +186,7 @@ Phase Run::pick() {
   if (held) {
     failures_ = pushes_ = look_ = 0;
     resort_ = Resort::none;
-    return Phase::place;
+    return with_part();
   }
   failed_.push_back({{report_.base_from_tcp, grasp.gripper}, report_.base_from_part.translation(), scene_});
   tell("missed");

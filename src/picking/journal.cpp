@@ -80,6 +80,10 @@ void follow(JournalState& state, const Entry& entry, const std::string& where) {
       if (entry.from_station) state.at_station.reset();
       hand.in_hand = entry;
       break;
+    case Event::measured:
+      if (!hand.in_hand) cannot_follow(where, entry, "where no part is in the hand");
+      hand.in_hand = entry;
+      break;
     case Event::missed:
     case Event::moved:
     case Event::not_taken:

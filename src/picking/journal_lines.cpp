@@ -8,13 +8,16 @@
 namespace tribin::picking {
 namespace {
 
-constexpr std::array kNames = {"new_rack", "pick_ordered", "picked", "missed",    "place_ordered", "placed",
-                               "lost",     "move_ordered", "moved",  "not_taken", "operator_said"};
+constexpr std::array kNames = {"new_rack", "pick_ordered", "picked",       "measured", "missed",    "place_ordered",
+                               "placed",   "lost",         "move_ordered", "moved",    "not_taken", "operator_said"};
 
 Entry entry_of(const io::JsonPlace& line) {
   line.must_be_object("a journal entry");
   line.only_keys({"event", "cycle", "scene", "part", "gripper", "grasp", "slot", "base_from_part", "tcp_from_part",
-                  "opening_mm", "from_station", "note", "arm"});
+                  "opening_mm", "holds_mm", "sigma_mm", "from_station", "note", "arm"});
+  const auto length = [&line](const char* key) {
+    return line.has(key) ? line.at(key, "mm").number(0, 1e5, "a length in mm") : 0.0;
+  };
   const auto text = [&line](const char* key) {
     return line.has(key) ? line.at(key, "a text").text("a text") : std::string();
   };
@@ -37,7 +40,7 @@ Entry entry_of(const io::JsonPlace& line) {
     if (!from.value().is_boolean()) from.fail("true or false");
     entry.from_station = from.value().get<bool>();
   }
-  if (line.has("opening_mm")) entry.opening_mm = line.at("opening_mm", "mm").number(0, 1e5, "a length in mm");
+  entry.opening_mm = length("opening_mm"), entry.holds_mm = length("holds_mm"), entry.sigma_mm = length("sigma_mm");
   return entry;
 }
 
@@ -57,6 +60,8 @@ std::string line_of(const Entry& entry) {
     json["grasp"] = entry.grasp;
     json["slot"] = entry.slot;
     json["opening_mm"] = entry.opening_mm;
+    if (entry.holds_mm > 0) json["holds_mm"] = entry.holds_mm;
+    if (entry.sigma_mm > 0) json["sigma_mm"] = entry.sigma_mm;
     if (entry.from_station) json["from_station"] = true;
     json["base_from_part"] = io::json_of(entry.base_from_part);
     json["tcp_from_part"] = io::json_of(entry.tcp_from_part);

@@ -5,6 +5,11 @@
 #include "tribin/core/error.hpp"
 
 namespace tribin::picking {
+namespace {
+
+constexpr std::size_t kMostStops = 6;  // of one command
+
+}  // namespace
 
 const Chooser::Start& Run::here() {
   if (!here_) {
@@ -119,6 +124,23 @@ FlangePose Run::go_to_look() {
       [this] { return Pose(robot::pose_of(links_.controller->position()) * gripper_now().flange_from_tcp.inverse()); };
 }
 
+void Run::step_aside() {
+  const WorkCell& cell = *links_.cell;
+  if (cell.mount() != CameraMount::fixed || !cell.bin) return;
+  const Gripper& gripper = gripper_now();
+  const Vec3 tcp = cell.bin->base_from_bin.inverse() * (here().base_from_flange * gripper.flange_from_tcp).translation();
+  const Vec3 half = cell.bin->inner_size_mm / 2;
+  if (std::abs(tcp.x()) > half.x() || std::abs(tcp.y()) > half.y()) return;
+  Pose aside = chooser_.over_bin();
+  aside.translation().head<2>() = chooser_.slots().front().base_from_slot.translation().head<2>();
+  const auto stops = chooser_.whole_way(here(), aside, gripper.name);
+  if (!stops || stops->size() > kMostStops) return;  // it is seen then, as something that is no part
+  Entry entry;
+  entry.event = Event::move_ordered;
+  entry.scene = scene_;
+  order(entry, robot::CycleCommand::way_points, *stops, gripper.name, 0, 0);
+}
+
 Entry pick_of(const Choice& choice, int scene) {
   const grasp::Grasp& grasp = choice.grasp;
   Entry entry;
@@ -128,7 +150,7 @@ Entry pick_of(const Choice& choice, int scene) {
   entry.slot = choice.placing.slot ? choice.placing.slot->number : 0;
   entry.base_from_part = choice.part.base_from_part;
   entry.tcp_from_part = grasp.part_from_tcp.inverse();
-  entry.opening_mm = grasp.opening_before_mm;
+  entry.opening_mm = grasp.opening_before_mm, entry.holds_mm = grasp.opening_mm;
   return entry;
 }
 
@@ -148,6 +170,9 @@ bool Run::carry_out_pick(const Choice& choice, int scene, bool from_station) {
     stops.push_back({grasp.at(step)->base_from_tcp, grasp.at(step)->joints});
   Entry entry = pick_of(choice, scene);
   entry.from_station = from_station;
+  grip_ = chooser_.grip_of(grasp.gripper, grasp.at(grasp::Step::pick)->base_from_tcp, entry.tcp_from_part,
+                           choice.part.covariance, from_station);
+  if (links_.cell->in_hand) entry.sigma_mm = chooser_.held(*grip_, entry.part, {}).sigma_mm();
   const int part_class = static_cast<int>(&chooser_.cell_part(grasp.part_name) - links_.cell->parts.data()) + 1;
   return order(entry, robot::CycleCommand::pick, stops, grasp.gripper, grasp.opening_before_mm, part_class) ==
          robot::CycleResult::done;

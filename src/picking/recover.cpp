@@ -78,7 +78,7 @@ Phase Run::recover() {
                       ") was ordered, and the controller does not tell how it ended");
   }
   if (options_.recover_only) return finish("recovered", "nothing is open");
-  if (now().in_hand) return Phase::place;
+  if (now().in_hand) return with_part();
   return now().at_station ? Phase::regrasp : Phase::scan;
 }
 

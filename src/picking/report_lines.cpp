@@ -29,6 +29,16 @@ std::string line_of(const CycleReport& report) {
     json["base_from_part"] = io::json_of(report.base_from_part);
     json["base_from_tcp"] = io::json_of(report.base_from_tcp);
   }
+  if (report.in_hand) {
+    nlohmann::ordered_json& in_hand = json["in_hand"];
+    in_hand["measured"] = report.in_hand->measured;
+    in_hand["sigma_mm"] = rounded(report.in_hand->sigma_mm, 1e3);
+    if (report.in_hand->measured) {
+      in_hand["moved_mm"] = rounded(report.in_hand->moved_mm, 1e3);
+      in_hand["moved_deg"] = rounded(report.in_hand->moved / kDegree, 1e3);
+    }
+    if (!report.in_hand->why.empty()) in_hand["why"] = report.in_hand->why;
+  }
   json["seen"] = nlohmann::ordered_json::object();
   for (const auto& [part, count] : report.seen) json["seen"][part] = count;
   json["refused"] = nlohmann::ordered_json::object();

@@ -72,10 +72,11 @@ Phase Run::regrasp() {
       Choice choice;
       choice.grasp = grasp;
       choice.part.base_from_part = standing.base_from_part;
+      choice.part.covariance = covariance_of_standing(*links_.cell);
       choice.placing = *placing;
       if (carry_out_pick(choice, standing.scene, true)) {
         failures_ = 0;
-        return Phase::place;
+        return with_part();
       }
       failed_.push_back(
           {{grasp.at(grasp::Step::pick)->base_from_tcp, grasp.gripper}, standing.base_from_part.translation(), scene_});

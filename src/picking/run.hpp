@@ -40,9 +40,15 @@ class Run {
   Phase scan();
   Phase choose();
   Phase pick();
+  Phase show();
   Phase place();
   Phase regrasp();
   Phase push();
+
+  // show.cpp
+  /// What comes when a part is in the hand.
+  Phase with_part() const;
+  Phase measured(const Entry& held, const HeldPose& pose);
 
   // recover.cpp
   void take_answer();
@@ -57,6 +63,8 @@ class Run {
   FlangePose go_to_look();
   const Gripper& gripper_now() const;  ///< as the controller tells
   void lift_to_change(const std::string& gripper);
+  /// A fixed camera sees the arm where it picks: it leaves the bin before a scan.
+  void step_aside();
   bool carry_out_pick(const Choice& choice, int scene, bool from_station);
   const Chooser::Start& here();
 
@@ -86,6 +94,7 @@ class Run {
     int scene;
   };
   std::vector<Failed> failed_;
+  std::optional<Grip> grip_;            ///< of what is in the hand
   std::optional<Chooser::Start> here_;  ///< where the arm was sent last
   RunEnd end_;
 };

@@ -12,7 +12,6 @@
 namespace tribin::picking {
 namespace {
 
-constexpr double kSettled = 0.3 * kDegree;  // sd of how a part turns while it is gripped and let go
 constexpr int kTurns = 24;                  // of a round part: 15 deg, what a jaw's width forgives
 
 class CameraVision : public Vision {
@@ -23,15 +22,7 @@ class CameraVision : public Vision {
   }
 
   Sight scan(const FlangePose& flange) override {
-    Shot shot = from_.camera->grab();
-    if (flange && !shot.taken.base_from_flange) {  // asked afterwards, while the arm still stands
-      shot.taken.base_from_flange = flange();
-      shot.taken.flange_time_ms = now_ms();
-    }
-    scan_ = scan_of(std::move(shot), from_.rig).result.scan;
-    const std::optional<std::int64_t> now = from_.any_age ? std::nullopt : std::optional(now_ms());
-    const Pose base_from_input = base_from_camera(*from_.cell, scan_.taken, from_.camera->name(), now);
-    base_from_camera_ = base_from_input * scan_.input_from_camera;
+    scan_ = take_scan(flange, base_from_camera_);
     FinderOptions options;
     if (from_.cell->bin) options.bin = known_bin(*from_.cell, scan_);
     found_ = find_parts(scan_, *from_.parts, options);
@@ -45,6 +36,12 @@ class CameraVision : public Vision {
       if (warning.code == "calibration_drift") sight.suspect = warning.text;
     }
     return sight;
+  }
+
+  HandSight look_at_hand(const std::string& part, const HandView& view) override {
+    Pose base_from_camera = Pose::Identity();
+    const Scan scan = take_scan({}, base_from_camera);
+    return picking::look_at_hand(scan, base_from_camera, model(part), view);
   }
 
   RoomSeen room(const Pose& base_from_box, const Vec3& size_mm) const override {
@@ -77,12 +74,7 @@ class CameraVision : public Vision {
     grasp::PartHere here;
     here.part = &known(part);
     here.base_from_part = base_from_part;
-    // It was gripped, carried and let go since it was measured.
-    const double robot = from_.cell->robots.front().sigma_mm, turn = kSettled;
-    double slip = 0;
-    for (const Gripper& gripper : from_.cell->grippers) slip = std::max(slip, gripper.slip_mm);
-    const double place = robot * robot + slip * slip;
-    here.covariance.diagonal() << place, place, place, turn * turn, turn * turn, turn * turn;
+    here.covariance = covariance_of_standing(*from_.cell);
     scene.parts.push_back(here);
     add_places(scene, places);
     return grasp::plan_grasps(scene, options);
@@ -97,6 +89,19 @@ class CameraVision : public Vision {
   }
 
  private:
+  Scan take_scan(const FlangePose& flange, Pose& base_from_scan_camera) {
+    Shot shot = from_.camera->grab();
+    if (flange && !shot.taken.base_from_flange) {  // asked afterwards, while the arm still stands
+      shot.taken.base_from_flange = flange();
+      shot.taken.flange_time_ms = now_ms();
+    }
+    Scan scan = scan_of(std::move(shot), from_.rig).result.scan;
+    const std::optional<std::int64_t> now = from_.any_age ? std::nullopt : std::optional(now_ms());
+    base_from_scan_camera =
+        base_from_camera(*from_.cell, scan.taken, from_.camera->name(), now) * scan.input_from_camera;
+    return scan;
+  }
+
   const grasp::GraspPart& known(const std::string& name) const {
     for (const grasp::GraspPart& part : known_)
       if (part.part->name == name) return part;

@@ -7,9 +7,7 @@
 #include "tribin/core/error.hpp"
 
 namespace tribin::sim {
-namespace {
 
-/// A box or a cylinder as a mesh.
 Mesh mesh_of(const grasp::Convex& body) {
   const bool round = body.disc_mm > 0;
   const double radius = body.disc_mm + body.radius_mm;
@@ -34,8 +32,6 @@ Mesh mesh_of(const grasp::Convex& body) {
   }
   return mesh;
 }
-
-}  // namespace
 
 void CellWorld::drop_parts(const SimulatedCellOptions& options) {
   const Bin bin{cell_.bin->inner_size_mm.x(), cell_.bin->inner_size_mm.y(), cell_.bin->inner_size_mm.z(),

@@ -262,6 +262,21 @@ std::vector<CellWorld::Standing> CellWorld::standing() const {
   return out;
 }
 
+std::vector<CellWorld::Carried> CellWorld::carried() const {
+  std::vector<Carried> out;
+  for (const MovingArm& arm : arms_) {
+    if (arm.joints)
+      for (const grasp::Convex& link : grasp::arm_bodies(robot_, *arm.arm, waist_, *arm.joints))
+        out.push_back({mesh_of(link), Pose::Identity()});
+    if (arm.tool >= 0)
+      for (const grasp::Convex& piece : grasp::pieces_at(tools_[arm.tool].shape, tools_[arm.tool].opening_mm))
+        out.push_back({mesh_of(piece), arm.base_from_tcp});
+    if (arm.held >= 0)
+      out.push_back({heap_->solid(arm.held).mesh(), arm.base_from_tcp * arm.tcp_from_held, true});
+  }
+  return out;
+}
+
 void CellWorld::note_scan() {
   for (int i = 0; i < heap_->parts(); ++i) {
     if (truth_.parts[i].where != Whereabouts::in_bin || at_scan_.empty()) continue;

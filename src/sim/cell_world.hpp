@@ -8,11 +8,15 @@
 #include "sim/cell_errors.hpp"
 #include "sim/live_heap.hpp"
 #include "sim/random.hpp"
+#include "tribin/cad/mesh.hpp"
 #include "tribin/grasp/gripper_shape.hpp"
 #include "tribin/picking/rack.hpp"
 #include "tribin/sim/work_cell.hpp"
 
 namespace tribin::sim {
+
+/// A box or a cylinder as a mesh, another body as one around it. (cell_start.cpp)
+Mesh mesh_of(const grasp::Convex& body);
 
 /// What happens in the cell while the controller moves the arm: the heap, the gripper, what it holds and what it
 /// touches. Base frame, unless a name says otherwise.
@@ -39,6 +43,13 @@ class CellWorld {
     Pose base_from_part;
   };
   std::vector<Standing> standing() const;
+  /// What else a camera may see: grippers as they stand open, what they hold, the arms' links.
+  struct Carried {
+    Mesh mesh;
+    Pose base_from_mesh;
+    bool part = false;
+  };
+  std::vector<Carried> carried() const;
   /// The true one; of a camera on the flange where that stands now.
   Pose base_from_camera() const;
   void note_scan();

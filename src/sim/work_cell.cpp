@@ -15,6 +15,7 @@ namespace {
 constexpr double kTick_s = 1.0 / 240;  // one step of the physics
 constexpr double kScan_s = 0.3;        // of a pattern set
 constexpr double kLongestFall_s = 3;   // until a heap is looked at although something still moves
+constexpr double kToolShine = 0.3;     // of grippers and arms: painted, or dull steel
 
 /// A clock on which waiting lets the cell go on, in steps of the physics.
 class CellClock : public controller_sim::VirtualClock {
@@ -149,6 +150,11 @@ struct SimulatedCell::State : Camera {
     const Pose camera_from_base = world.base_from_camera().inverse();
     for (const auto& part : standing)
       bodies.push_back({&stock->meshes[part.part_class], camera_from_base * part.base_from_part, 0.45, 1});
+    // A camera on the flange is mounted so that its own tool is not in its view.
+    const auto carried = cell.mount() == CameraMount::fixed ? world.carried() : std::vector<CellWorld::Carried>();
+    for (const auto& body : carried)
+      bodies.push_back(
+          {&body.mesh, camera_from_base * body.base_from_mesh, 0.45, body.part ? 1.0 : kToolShine, body.part});
     if (!noisy) sensor.noise_mm = 1e-3, sensor.mixed_pixels = false, sensor.systematic = 0;
     return simulate_scan(bodies, sensor, mixed(options.seed) + shots);
   }

@@ -24,6 +24,8 @@ struct Totals {
   int bins = 0, parts = 0, placed = 0, placed_without_help = 0, picks = 0, missed = 0, lost = 0, put_down = 0,
       pushes = 0;
   int collisions = 0, wrong = 0, twice = 0, disturbed = 0;
+  int measured = 0;                      ///< looks at a part in the hand that were believed
+  std::map<std::string, int> in_hand;    ///< why they were not, or why the grip was not
   std::map<std::string, int> ends, refused, left, grip_failures, touched;
   double robot_s = 0;
   std::vector<double> off_mm, off_deg, find_ms, plan_ms, cycle_s;
@@ -160,6 +162,14 @@ int main(int argc, char** argv) try {
         without_help += report.resort == picking::Resort::none;
         totals.cycle_s.push_back(report.robot_s);
       }
+      if (report.in_hand && (report.state == "placed" || report.state == "put_down")) {
+        totals.measured += report.in_hand->measured;
+        if (!report.in_hand->why.empty()) ++totals.in_hand[report.in_hand->why];
+        if (verbose)
+          std::printf("      in the hand: %s, sigma %.2f mm, moved %.2f mm %.2f deg %s\n",
+                      report.in_hand->measured ? "measured" : "as gripped", report.in_hand->sigma_mm,
+                      report.in_hand->moved_mm, report.in_hand->moved / kDegree, report.in_hand->why.c_str());
+      }
       if (report.find_ms > 0) totals.find_ms.push_back(report.find_ms);
       totals.plan_ms.push_back(report.plan_ms);
       for (const auto& reason : report.refused) totals.refused[std::string(name_of(reason.why))] += reason.count;
@@ -244,6 +254,8 @@ int main(int argc, char** argv) try {
               quantile(totals.plan_ms, 0.95));
   std::printf("robot: %.1f s a placed part\n", totals.robot_s / std::max(1, totals.placed));
   std::printf("cycle: median %.1f s, 95 %% %.1f s\n", quantile(totals.cycle_s, 0.5), quantile(totals.cycle_s, 0.95));
+  std::printf("measured in the hand: %d\n", totals.measured);
+  print("in the hand otherwise, or not believed", totals.in_hand);
   print("ends", totals.ends);
   print("left", totals.left);
   print("grips that held nothing", totals.grip_failures);

@@ -118,6 +118,11 @@ struct Regrasp {
   Pose base_from_station = Pose::Identity();  ///< z up
 };
 
+/// Where the arm shows what it holds to a fixed camera, which then measures how it is held.
+struct InHand {
+  std::vector<Pose> looks;  ///< base_from_flange of each scan; one at least
+};
+
 enum class ControllerKind { nx100, hses, text };
 
 struct CellController {
@@ -159,6 +164,7 @@ struct WorkCell {
   std::vector<CellPart> parts;
   std::optional<Rack> rack;
   std::optional<Regrasp> regrasp;
+  std::optional<InHand> in_hand;
   std::vector<CellRobot> robots;
   Safety safety;
   std::vector<std::string> warnings;

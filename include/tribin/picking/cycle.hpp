@@ -19,6 +19,7 @@ enum class Phase {
   scan,
   choose,  ///< the best grasp that can be placed; none: the next resort
   pick,
+  show,     ///< the part in the hand is measured, where the cell has [in_hand]
   place,    ///< or put down at the station
   regrasp,  ///< pick it from there
   push,
@@ -29,6 +30,14 @@ std::string_view name_of(Phase phase);
 /// What is tried, in this order, when nothing can be picked.
 enum class Resort { none, next_gripper, full_tilt, next_look, push };
 std::string_view name_of(Resort resort);
+
+/// What a scan of the part in the hand told.
+struct InHandReport {
+  bool measured = false;            ///< false: the part is placed as the grip implies, and `why` tells for what reason
+  double sigma_mm = 0;              ///< of its place in the hand
+  double moved_mm = 0, moved = 0;   ///< from where the grip implies, and its turn [rad]
+  std::string why;
+};
 
 /// One line of the run's report.
 struct CycleReport {
@@ -43,6 +52,7 @@ struct CycleReport {
   std::vector<grasp::Term> terms;
   std::vector<grasp::WhyCount> refused;  ///< of the last plan
   std::map<std::string, int> seen;
+  std::optional<InHandReport> in_hand;
   double find_ms = 0, plan_ms = 0;  ///< of this machine
   double robot_s = 0;               ///< since the cycle's scan, by the controller's clock
   std::string note;

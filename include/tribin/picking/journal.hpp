@@ -17,6 +17,7 @@ enum class Event {
   new_rack,       ///< an empty rack stands there
   pick_ordered,   ///< next: picked or missed
   picked,         ///< the part is in the hand
+  measured,       ///< a scan in the hand shows how it is held
   missed,         ///< nothing was gripped
   place_ordered,  ///< next: placed or lost
   placed,
@@ -40,6 +41,8 @@ struct Entry {
   Pose base_from_part = Pose::Identity();  ///< as it was measured
   Pose tcp_from_part = Pose::Identity();   ///< in the hand
   double opening_mm = 0;                   ///< of the jaws before they close, and when they let go
+  double holds_mm = 0;                     ///< of the jaws where they hold
+  double sigma_mm = 0;                     ///< sd of its place in the hand, with [in_hand]; 0 = not said
   std::string note;                        ///< for people
 };
 

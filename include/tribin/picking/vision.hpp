@@ -10,7 +10,9 @@
 #include "tribin/camera/camera.hpp"
 #include "tribin/config/work_cell.hpp"
 #include "tribin/grasp/grasp.hpp"
+#include "tribin/grasp/gripper_shape.hpp"
 #include "tribin/kinematics/arm.hpp"
+#include "tribin/picking/in_hand.hpp"
 
 /// What the cycle asks of camera, recognition and grasp planning.
 namespace tribin::picking {
@@ -50,6 +52,29 @@ enum class RoomSeen {
 RoomSeen look_into(const Scan& scan, const Pose& base_from_camera, const Pose& base_from_box, const Vec3& size_mm,
                    double sigma_mm);
 
+/// A part in the hand, shown to the camera.
+struct HandView {
+  const grasp::GripperShape* gripper = nullptr;
+  double opening_mm = 0;  ///< of the jaws as they hold it
+  Pose base_from_tcp = Pose::Identity();
+  Pose tcp_from_part = Pose::Identity();  ///< as the grip implies
+};
+/// What a scan says of it.
+struct HandSight {
+  enum class State {
+    measured,   ///< near where the grip has it
+    otherwise,  ///< sure, and in another pose than the grip implies: found upside down, or slipped far
+    unsure,     ///< too little is seen, or nothing tells: `why`
+    gone,       ///< it is not in the gripper
+  };
+  State state = State::unsure;
+  HandLook look;  ///< where it is measured or otherwise
+  std::string why;
+};
+/// Measures a part in the hand: pixels near the gripper as drawn count for nothing, and the part's symmetries are taken
+/// nearest to the grip.
+HandSight look_at_hand(const Scan& scan, const Pose& base_from_camera, const Part& part, const HandView& view);
+
 class Vision {
  public:
   virtual ~Vision() = default;
@@ -64,6 +89,13 @@ class Vision {
   virtual RoomSeen room(const Pose& base_from_box, const Vec3& size_mm) const {
     (void)base_from_box, (void)size_mm;
     return RoomSeen::hidden;
+  }
+  /// Takes a scan of a part in the hand and measures it; the last scan stays as it is.
+  virtual HandSight look_at_hand(const std::string& part, const HandView& view) {
+    (void)part, (void)view;
+    HandSight sight;
+    sight.why = "there is no camera";
+    return sight;
   }
   /// Grasps for what the last scan showed. May be asked again with other options.
   virtual grasp::Plan plan(const grasp::PlanOptions& options, const Places& places) = 0;
