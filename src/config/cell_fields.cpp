@@ -204,12 +204,13 @@ Fields<Regrasp> regrasp_fields() {
 Fields<InHand> in_hand_fields() {
   Fields<InHand> fields;
   return fields
-      .value("looks", "", "1 to 6 poses", "required", &InHand::looks,
-             "base_from_flange where the arm shows what it holds: a scan at each; before a fixed camera, clear of the bin",
-             [](const TomlPlace& place) {
-               if (place.array_size("a list of 1 to 6 poses") == 0) place.fail("a list of 1 to 6 poses");
-               return read_way_points(place);
-             })
+      .value(
+          "looks", "", "1 to 6 poses", "required", &InHand::looks,
+          "base_from_flange where the arm shows what it holds: a scan at each; before a fixed camera, clear of the bin",
+          [](const TomlPlace& place) {
+            if (place.array_size("a list of 1 to 6 poses") == 0) place.fail("a list of 1 to 6 poses");
+            return read_way_points(place);
+          })
       .required();
 }
 

@@ -32,9 +32,8 @@ std::optional<std::vector<Stop>> Chooser::way_to_show(const Start& start, const 
   carried.push_back(box_of(vision_.model(held.part), held.tcp_from_part));
   // Before its last piece the way is as high as all ways are.
   const Pose to = stops->back().base_from_tcp;
-  const Vec3 down = stops->size() > 1
-                        ? Vec3((*stops)[stops->size() - 2].base_from_tcp.translation() - to.translation())
-                        : Vec3(Vec3::Zero());
+  const Vec3 down = stops->size() > 1 ? Vec3((*stops)[stops->size() - 2].base_from_tcp.translation() - to.translation())
+                                      : Vec3(Vec3::Zero());
   for (const grasp::Convex& piece : carried) {
     grasp::Convex body = grasp::moved(to, piece);
     body.sweep_mm = down;

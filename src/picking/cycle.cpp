@@ -15,7 +15,8 @@ constexpr double kSamePart_mm = 20;  // a part that was missed lies that near to
 }  // namespace
 
 std::string_view name_of(Phase phase) {
-  constexpr std::string_view kNames[] = {"recover", "scan", "choose",  "pick", "show", "place", "regrasp", "push", "end"};
+  constexpr std::string_view kNames[] = {"recover", "scan",    "choose", "pick", "show",
+                                         "place",   "regrasp", "push",   "end"};
   return kNames[static_cast<int>(phase)];
 }
 

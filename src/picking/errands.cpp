@@ -7,9 +7,8 @@
 namespace tribin::picking {
 namespace {
 
-constexpr std::size_t kMostStops = 6;  // of one command
-constexpr int kPushClass = 255;        // B002 of a push, for jobs that close the jaws then
-constexpr double kClosed_mm = 0.1;     // an opening that is said, and closed
+constexpr int kPushClass = 255;     // B002 of a push, for jobs that close the jaws then
+constexpr double kClosed_mm = 0.1;  // an opening that is said, and closed
 
 Entry move_entry(int arm, int scene) {
   Entry entry;

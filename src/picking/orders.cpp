@@ -5,12 +5,6 @@
 #include "tribin/core/error.hpp"
 
 namespace tribin::picking {
-namespace {
-
-constexpr std::size_t kMostStops = 6;  // of one command
-
-}  // namespace
-
 const Chooser::Start& Run::here() {
   if (!here_) {
     here_ = Chooser::Start{robot::pose_of(links_.controller->position()) * gripper_now().flange_from_tcp.inverse(), {}};
@@ -128,7 +122,8 @@ void Run::step_aside() {
   const WorkCell& cell = *links_.cell;
   if (cell.mount() != CameraMount::fixed || !cell.bin) return;
   const Gripper& gripper = gripper_now();
-  const Vec3 tcp = cell.bin->base_from_bin.inverse() * (here().base_from_flange * gripper.flange_from_tcp).translation();
+  const Vec3 tcp =
+      cell.bin->base_from_bin.inverse() * (here().base_from_flange * gripper.flange_from_tcp).translation();
   const Vec3 half = cell.bin->inner_size_mm / 2;
   if (std::abs(tcp.x()) > half.x() || std::abs(tcp.y()) > half.y()) return;
   Pose aside = chooser_.over_bin();

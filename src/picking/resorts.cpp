@@ -12,7 +12,6 @@ constexpr int kMostTurns = 3;             // at the station, of one part
 constexpr double kTurned = 45 * kDegree;  // a part that is put back as it stood gains nothing
 constexpr int kPushClass = 255;           // B002 of a push, for jobs that close the jaws then
 constexpr double kClosed_mm = 0.1;        // an opening that is said, and closed
-constexpr std::size_t kMostStops = 6;     // of one command
 
 }  // namespace
 

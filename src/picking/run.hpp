@@ -4,7 +4,8 @@
 
 namespace tribin::picking {
 
-inline constexpr int kMostFailures = 10;  // grips in a row that held nothing: something else is wrong
+inline constexpr int kMostFailures = 10;      // grips in a row that held nothing: something else is wrong
+inline constexpr std::size_t kMostStops = 6;  // of one command
 inline constexpr Chooser::Where kAllPlaces[] = {Chooser::Where::slots, Chooser::Where::station, Chooser::Where::turned};
 
 /// For people: what software refuses; the most frequent reasons of a plan.

@@ -7,7 +7,6 @@
 namespace tribin::picking {
 namespace {
 
-constexpr std::size_t kMostStops = 6;  // of one command
 // Looks and grip contradict each other beyond this: by chance one in 10,000 (chi-square of six degrees of freedom, so
 // many a look). Then the part has slipped farther than parts do, and the looks alone are believed.
 constexpr double kChi2 = 28;
@@ -60,9 +59,9 @@ Phase Run::show() {
     }
     StageTimes times;
     auto watch = std::make_optional<StageTimer>(times, "look");
-    const HandSight sight =
-        links_.vision->look_at_hand(held.part, {&chooser_.shape(held.gripper), held.holds_mm,
-                                                base_from_flange * flange_from_tcp, held.tcp_from_part});
+    const HandSight sight = links_.vision->look_at_hand(
+        held.part,
+        {&chooser_.shape(held.gripper), held.holds_mm, base_from_flange * flange_from_tcp, held.tcp_from_part});
     watch.reset();
     report_.find_ms += times.total();
     if (sight.state == HandSight::State::gone) {

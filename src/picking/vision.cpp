@@ -12,7 +12,7 @@
 namespace tribin::picking {
 namespace {
 
-constexpr int kTurns = 24;                  // of a round part: 15 deg, what a jaw's width forgives
+constexpr int kTurns = 24;  // of a round part: 15 deg, what a jaw's width forgives
 
 class CameraVision : public Vision {
  public:

@@ -271,8 +271,7 @@ std::vector<CellWorld::Carried> CellWorld::carried() const {
     if (arm.tool >= 0)
       for (const grasp::Convex& piece : grasp::pieces_at(tools_[arm.tool].shape, tools_[arm.tool].opening_mm))
         out.push_back({mesh_of(piece), arm.base_from_tcp});
-    if (arm.held >= 0)
-      out.push_back({heap_->solid(arm.held).mesh(), arm.base_from_tcp * arm.tcp_from_held, true});
+    if (arm.held >= 0) out.push_back({heap_->solid(arm.held).mesh(), arm.base_from_tcp * arm.tcp_from_held, true});
   }
   return out;
 }

@@ -24,8 +24,8 @@ struct Totals {
   int bins = 0, parts = 0, placed = 0, placed_without_help = 0, picks = 0, missed = 0, lost = 0, put_down = 0,
       pushes = 0;
   int collisions = 0, wrong = 0, twice = 0, disturbed = 0;
-  int measured = 0;                      ///< looks at a part in the hand that were believed
-  std::map<std::string, int> in_hand;    ///< why they were not, or why the grip was not
+  int measured = 0;                    ///< looks at a part in the hand that were believed
+  std::map<std::string, int> in_hand;  ///< why they were not, or why the grip was not
   std::map<std::string, int> ends, refused, left, grip_failures, touched;
   double robot_s = 0;
   std::vector<double> off_mm, off_deg, find_ms, plan_ms, cycle_s;

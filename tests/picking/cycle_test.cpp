@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <random>
+
 #include "support/fake_cell.hpp"
 #include "support/temporary_folder.hpp"
 #include "tribin/controller_sim/virtual_link.hpp"
@@ -218,6 +220,144 @@ TEST(Cycle, ASlotThatTheScanDoesNotShowEmptyIsLeft) {
     EXPECT_NE(end.message.find("slot_occupied: the scan "), std::string::npos) << end.message;
     EXPECT_NE(end.message.find("slot 1 (a)"), std::string::npos) << end.message;
     bench.expect_truth_is_as_told();
+  }
+}
+
+WorkCell cell_that_shows() {
+  WorkCell cell = test::fake_work_cell();
+  cell.in_hand = InHand{{test::looking_down(Vec3(1000, 300, 700))}};
+  return cell;
+}
+
+/// What a camera would see of a part that slipped by that much, with errors of so much a direction.
+HandSight seen_in_hand(const HandView& view, const Vec3& slipped, double sigma_mm) {
+  HandSight sight;
+  sight.state = HandSight::State::measured;
+  sight.look.base_from_tcp = view.base_from_tcp;
+  sight.look.base_from_part = view.base_from_tcp * view.tcp_from_part;
+  sight.look.base_from_part.translation() += slipped;
+  sight.look.covariance.diagonal() << Vec3::Constant(sigma_mm * sigma_mm), Vec3::Constant(1e-6);
+  return sight;
+}
+
+TEST(Cycle, WhatIsMeasuredInTheHandIsPlacedBetter) {
+  constexpr double kSlip_mm = 0.15, kSeen_mm = 0.015;  // a direction
+  for (unsigned seed = 1; seed <= 6; ++seed) {
+    SCOPED_TRACE(seed);
+    double mean[2] = {0, 0};
+    for (const bool shows : {false, true}) {
+      WorkCell cell = shows ? cell_that_shows() : test::fake_work_cell();
+      cell.robots.front().sigma_mm = cell.hand_eye.sigma_mm = 0.02;
+      cell.grippers.front().slip_mm = kSlip_mm * std::sqrt(3.0);
+      Bench bench(8, cell);
+      std::mt19937 random(seed);
+      std::normal_distribution<double> normal;
+      const auto drawn = [&](double sigma) {
+        return Vec3(sigma * Vec3(normal(random), normal(random), normal(random)));
+      };
+      bench.truth.slip = [&] { return drawn(kSlip_mm); };
+      bench.vision.in_hand = [&](const HandView& view) {
+        return seen_in_hand(view, bench.truth.slipped + drawn(kSeen_mm), kSeen_mm);
+      };
+      EXPECT_EQ(bench.run().placed, 6);
+      bench.expect_truth_is_as_told();
+      EXPECT_EQ(bench.vision.hand_looks, shows ? 6 : 0);
+      for (const CycleReport& report : bench.told) {
+        EXPECT_EQ(report.in_hand.has_value(), shows);
+        if (report.in_hand) {
+          EXPECT_TRUE(report.in_hand->measured) << report.in_hand->why;
+          EXPECT_LT(report.in_hand->sigma_mm, 0.2);
+        }
+      }
+      for (const double off : bench.truth.off_mm) mean[shows] += off / 6;
+    }
+    EXPECT_LT(mean[1], 0.5 * mean[0]);
+  }
+}
+
+TEST(Cycle, WhatIsNotMeasuredInTheHandIsPlacedAsItWasGripped) {
+  Bench bench(8, cell_that_shows());
+  bench.vision.in_hand = [](const HandView&) {
+    HandSight sight;
+    sight.why = "it is not seen";
+    return sight;
+  };
+  EXPECT_EQ(bench.run().placed, 6);
+  bench.expect_truth_is_as_told();
+  for (const CycleReport& report : bench.told) {
+    ASSERT_TRUE(report.in_hand);
+    EXPECT_FALSE(report.in_hand->measured);
+    EXPECT_EQ(report.in_hand->why, "it is not seen");
+  }
+  for (const double off : bench.truth.off_mm) EXPECT_LT(off, 0.01);
+}
+
+TEST(Cycle, AGripThatTheScanContradictsIsNotBelieved) {
+  Bench bench(1, cell_that_shows());
+  const Vec3 far(0.4, -0.3, 0);  // slip is 0.3 mm
+  bench.cell.grippers.front().slip_mm = 0.05, bench.cell.robots.front().sigma_mm = 0.01;
+  bench.cell.hand_eye.sigma_mm = 0.01;
+  bench.truth.slip = [&] { return far; };
+  bench.vision.in_hand = [&](const HandView& view) { return seen_in_hand(view, far, 0.05); };
+  EXPECT_EQ(bench.run().placed, 1);
+  ASSERT_TRUE(bench.told.front().in_hand);
+  EXPECT_EQ(bench.told.front().in_hand->why, "it slipped farther than parts do");
+  EXPECT_NEAR(bench.told.front().in_hand->moved_mm, 0.5, 0.01);
+  EXPECT_LT(bench.truth.off_mm.front(), 0.02);
+}
+
+TEST(Cycle, APartThatIsNotInTheHandIsLost) {
+  Bench bench(3, cell_that_shows());
+  int looks = 0;
+  bench.vision.in_hand = [&](const HandView& view) {
+    HandSight sight = seen_in_hand(view, Vec3::Zero(), 0.05);
+    if (++looks == 1) sight.state = HandSight::State::gone, bench.truth.held = -1;
+    return sight;
+  };
+  EXPECT_EQ(bench.run().placed, 2);
+  EXPECT_EQ(bench.count("lost"), 1);
+}
+
+TEST(Cycle, WhatIsHeldTooUnsurelyForItsSlotIsNotPlaced) {
+  WorkCell cell = cell_that_shows();
+  cell.rack->chamfer_mm = 1;  // less than three times the slip of 0.3 mm and the rest, more than without it
+  cell.robots.front().sigma_mm = 0.1, cell.hand_eye.sigma_mm = 0.1;
+  for (const bool seen : {true, false}) {
+    Bench bench(1, cell);
+    bench.vision.in_hand = [&](const HandView& view) {
+      HandSight sight = seen_in_hand(view, Vec3::Zero(), 0.02);
+      if (!seen) sight.state = HandSight::State::unsure;
+      return sight;
+    };
+    const RunEnd end = bench.run();
+    EXPECT_EQ(end.placed, seen ? 1 : 0);
+    EXPECT_EQ(end.status, seen ? "empty" : "in_doubt") << end.message;
+  }
+}
+
+TEST(Cycle, WhatWasMeasuredBeforeACrashIsPlacedSo) {
+  WorkCell cell = cell_that_shows();
+  cell.robots.front().sigma_mm = cell.hand_eye.sigma_mm = 0.02;
+  Bench bench(1, cell);
+  const Vec3 slipped(0.3, 0.2, 0);
+  bench.truth.slip = [&] { return slipped; };
+  bench.vision.in_hand = [&](const HandView& view) { return seen_in_hand(view, slipped, 0.001); };
+  for (const Phase crash : {Phase::show, Phase::place}) {
+    SCOPED_TRACE(name_of(crash));
+    bench.truth.refill(1);
+    bench.truth.rack.assign(6, {}), bench.truth.off_mm.clear();
+    std::filesystem::remove(bench.folder.path() / "rack.ndjson");
+    bench.vision.hand_looks = 0;
+    struct Crash {};
+    RunOptions options;
+    options.entered = [&](Phase phase) {
+      if (phase == crash) throw Crash();
+    };
+    EXPECT_THROW(bench.run(options), Crash);
+    EXPECT_EQ(bench.run().placed, 1);
+    EXPECT_EQ(bench.vision.hand_looks, 1);
+    ASSERT_EQ(bench.truth.off_mm.size(), 1u);
+    EXPECT_LT(bench.truth.off_mm.front(), 0.15);
   }
 }
 

@@ -187,6 +187,37 @@ struct SmallCell {
   std::shared_ptr<const CellStock> stock;
 };
 
+/// A tool that looks down on a battery, across its short side.
+Pose above(const PartTruth& battery) {
+  const Matrix3& r = battery.base_from_part.linear();
+  int up = 0;
+  r.row(2).cwiseAbs().maxCoeff(&up);
+  const int across = up == 1 ? 0 : 1;  // 66 mm, or 110 mm where it lies on a long side
+  Pose tcp = Pose::Identity();
+  tcp.linear().col(2) = -Vec3::UnitZ();
+  Vec3 x = r.col(across);
+  x.z() = 0;
+  tcp.linear().col(0) = x.normalized();
+  tcp.linear().col(1) = tcp.linear().col(2).cross(tcp.linear().col(0));
+  tcp.translation() = battery.base_from_part * Vec3(0, 0, 45);
+  return tcp;
+}
+
+/// A pick or a place: from above, at it, higher above.
+robot::CycleResult run(SimulatedCell& cell, robot::Controller& controller, robot::CycleCommand command, int cycle,
+                       const Pose& at) {
+  robot::CycleOrder order;
+  order.command = command;
+  order.cycle = cycle;
+  order.opening_mm = 140;
+  for (const double lift : {150.0, 0.0, 250.0}) {
+    Pose pose = at;
+    pose.translation().z() += lift;
+    order.positions.push_back(robot::position_from_pose(pose, 0, 1));
+  }
+  return run_cycle(controller, cell.clock(), order);
+}
+
 TEST(SimulatedCell, APickByTheHandshakeHoldsThePartAndAPlaceIsMeasured) {
   const SmallCell small;
   SimulatedCellOptions options;
@@ -197,30 +228,9 @@ TEST(SimulatedCell, APickByTheHandshakeHoldsThePartAndAPlaceIsMeasured) {
   const auto controller = cell.connect();
   const PartTruth before = cell.truth().parts.front();
   EXPECT_EQ(before.where, Whereabouts::in_bin);
-  // Down the part's own upright, across its short side.
-  const Matrix3& r = before.base_from_part.linear();
-  const Vec3 middle = before.base_from_part * Vec3(0, 0, 45);
-  int up = 0;
-  r.row(2).cwiseAbs().maxCoeff(&up);
-  const int across = up == 1 ? 0 : 1;  // 66 mm, or 110 mm where it lies on a long side
-  Pose tcp = Pose::Identity();
-  tcp.linear().col(2) = -Vec3::UnitZ();
-  Vec3 x = r.col(across);
-  x.z() = 0;
-  tcp.linear().col(0) = x.normalized();
-  tcp.linear().col(1) = tcp.linear().col(2).cross(tcp.linear().col(0));
-  tcp.translation() = middle;
+  const Pose tcp = above(before);
   const auto order = [&](robot::CycleCommand command, int cycle, const Pose& at) {
-    robot::CycleOrder order;
-    order.command = command;
-    order.cycle = cycle;
-    order.opening_mm = 140;
-    for (const double lift : {150.0, 0.0, 250.0}) {
-      Pose pose = at;
-      pose.translation().z() += lift;
-      order.positions.push_back(robot::position_from_pose(pose, 0, 1));
-    }
-    return run_cycle(*controller, cell.clock(), order);
+    return run(cell, *controller, command, cycle, at);
   };
   ASSERT_EQ(order(robot::CycleCommand::pick, 1, tcp), robot::CycleResult::done)
       << (cell.truth().failed_grips.empty() ? "" : cell.truth().failed_grips.back()) << '\n'
@@ -238,6 +248,45 @@ TEST(SimulatedCell, APickByTheHandshakeHoldsThePartAndAPlaceIsMeasured) {
   EXPECT_NEAR(after.off_mm, 2, 0.5);
   EXPECT_LT(after.off_rad, 0.2 * kDegree);
   EXPECT_EQ(after.times_placed, 1);
+}
+
+TEST(SimulatedCell, APartInTheHandIsMeasured) {
+  const SmallCell small;
+  Part battery = compile_part(small.stock->meshes.front());
+  battery.name = "battery";
+  const grasp::GripperShape jaw = grasp::gripper_shape(small.cell.grippers.front());
+  const Pose there = small.cell.in_hand->looks.front() * jaw.gripper.flange_from_tcp;
+  for (const std::uint64_t seed : {4, 5, 6}) {
+    SCOPED_TRACE(seed);
+    SimulatedCellOptions options;
+    options.parts = 1;
+    options.hand_eye_mm = options.hand_eye_rad = options.robot_mm = 0;
+    options.slip_mm = 1, options.slip_rad = 1 * kDegree;
+    options.seed = seed;
+    SimulatedCell cell(small.cell, small.robot, small.stock, options);
+    const auto controller = cell.connect();
+    const Pose tcp = above(cell.truth().parts.front());
+    const Pose tcp_from_part = tcp.inverse() * cell.truth().parts.front().base_from_part;
+    const auto look = [&](double opening_mm) {
+      const Scan scan = std::get<Scan>(cell.camera().grab().content);
+      return picking::look_at_hand(scan, base_from_camera(small.cell) * scan.input_from_camera, battery,
+                                   {&jaw, opening_mm, there, tcp_from_part});
+    };
+    EXPECT_EQ(look(66).state, picking::HandSight::State::gone);  // nothing is there yet
+    ASSERT_EQ(run(cell, *controller, robot::CycleCommand::pick, 1, tcp), robot::CycleResult::done);
+    robot::CycleOrder show;
+    show.command = robot::CycleCommand::way_points;
+    show.cycle = 2;
+    show.positions = {robot::position_from_pose(there, 0, 1)};
+    ASSERT_EQ(run_cycle(*controller, cell.clock(), show), robot::CycleResult::done);
+    const Pose truth = cell.truth().parts.front().base_from_part;
+    const int across = std::abs(tcp.linear().col(0).dot(truth.linear().col(0))) > 0.9 ? 110 : 66;
+    const picking::HandSight sight = look(across);
+    ASSERT_EQ(sight.state, picking::HandSight::State::measured) << sight.why;
+    const Vec3 middle = battery.box_center();
+    EXPECT_LT((sight.look.base_from_part * middle - truth * middle).norm(), 0.25);
+    EXPECT_LT(rotation_angle(sight.look.base_from_part.linear(), truth.linear()), 0.25 * kDegree);
+  }
 }
 
 TEST(SimulatedCell, TheSameSeedIsTheSameCell) {

@@ -5,6 +5,7 @@
 
 #include <fstream>
 #include <map>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -89,7 +90,10 @@ class FakeTruth {
   std::vector<bool> in_bin;
   std::vector<std::vector<std::string>> rack;  ///< what was put into each slot: more than one is too much
   int held = -1, held_by_second = -1, lost = 0, grips = 0;
-  std::vector<int> slippery;  ///< parts that the next grip misses
+  std::vector<int> slippery;   ///< parts that the next grip misses
+  std::function<Vec3()> slip;  ///< drawn at each grip, base; a gripper that looks down carries it
+  Vec3 slipped = Vec3::Zero();
+  std::vector<double> off_mm;  ///< of what was placed, from its slot
 
  private:
   /// Of the foot of what is gripped.
@@ -108,6 +112,7 @@ class FakeTruth {
         return false;
       }
       hand = static_cast<int>(i);
+      if (slip) slipped = slip();
       in_bin[i] = false;
     }
     save();
@@ -120,6 +125,7 @@ class FakeTruth {
     for (std::size_t i = 0; i < slots_.size(); ++i)
       if ((slots_[i].base_from_slot.translation() - at(machine, arm)).norm() < 1) {
         rack[i].push_back(kind_of(part));
+        off_mm.push_back((slots_[i].base_from_slot.translation() - at(machine, arm) - slipped).norm());
         placed = true;
       }
     lost += !placed;
@@ -206,10 +212,15 @@ class FakeVision : public picking::Vision {
     grasp::PartHere here;
     here.id = index;
     here.base_from_part.translation() = place_in_bin(index);
-    here.covariance = 0.01 * Matrix6::Identity();
+    here.covariance.diagonal() << Vec3::Constant(0.01), Vec3::Constant(1e-6);
     return here;
   }
   const Part& model(const std::string& name) const override { return models_[name == "b"]; }
+
+  picking::HandSight look_at_hand(const std::string&, const picking::HandView& view) override {
+    ++hand_looks;
+    return in_hand(view);
+  }
 
   picking::RoomSeen room(const Pose& base_from_box, const Vec3&) const override {
     for (const auto& [at, seen] : rooms)
@@ -218,6 +229,8 @@ class FakeVision : public picking::Vision {
   }
 
   std::vector<std::pair<Vec3, picking::RoomSeen>> rooms;  ///< that are not empty
+  std::function<picking::HandSight(const picking::HandView&)> in_hand;
+  int hand_looks = 0;
   int scans = 0, pushes = 0, pushes_to_free = 1;
   std::map<int, bool> hard;        ///< parts that only full tilt takes
   std::vector<int> buried;         ///< parts that a push frees

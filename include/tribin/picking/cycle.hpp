@@ -33,9 +33,9 @@ std::string_view name_of(Resort resort);
 
 /// What a scan of the part in the hand told.
 struct InHandReport {
-  bool measured = false;            ///< false: the part is placed as the grip implies, and `why` tells for what reason
-  double sigma_mm = 0;              ///< of its place in the hand
-  double moved_mm = 0, moved = 0;   ///< from where the grip implies, and its turn [rad]
+  bool measured = false;           ///< false: the part is placed as the grip implies, and `why` tells for what reason
+  double sigma_mm = 0;             ///< of its place in the hand
+  double moved_mm = 0, moved = 0;  ///< from where the grip implies, and its turn [rad]
   std::string why;
 };
 
