@@ -92,11 +92,11 @@ void each_field(Archive& to, T& view) {
 template <class Archive, Is<Part> T>
 void each_field(Archive& to, T& part) {
   auto& [name, mesh, render_mesh, coarse_mesh, coarse_error, model, exposed, primitive_of_triangle, box_min, box_max,
-         diameter, area, gyration, symmetry, declared, self_similar, nearly_round, views, sample_points, sample_normals,
-         warnings] = part;
+         diameter, largest_face, area, gyration, symmetry, declared, self_similar, nearly_round, views, sample_points,
+         sample_normals, warnings] = part;
   to(name, mesh, render_mesh, coarse_mesh, coarse_error, model, exposed, primitive_of_triangle, box_min, box_max,
-     diameter, area, gyration, symmetry, declared, self_similar, nearly_round, views, sample_points, sample_normals,
-     warnings);
+     diameter, largest_face, area, gyration, symmetry, declared, self_similar, nearly_round, views, sample_points,
+     sample_normals, warnings);
 }
 
 // The last value of each enum that is stored: a byte above it is no such enum.

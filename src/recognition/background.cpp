@@ -52,6 +52,16 @@ std::vector<Sheet> sheets_of(const SceneFeatures& scene, double off_plane_mm) {
   return sheets;
 }
 
+/// Largest distance between two of a sheet's points [mm].
+double extent_mm(const Sheet& sheet) {
+  std::vector<Vec3f> ends;
+  for (const SceneFeature* f : sheet) ends.insert(ends.end(), f->ends.begin(), f->ends.end());
+  float largest = 0;
+  for (std::size_t i = 0; i < ends.size(); ++i)
+    for (std::size_t k = 0; k < i; ++k) largest = std::max(largest, (ends[i] - ends[k]).squaredNorm());
+  return std::sqrt(largest);
+}
+
 bool reaches_further(const Sheet& sheet, double reach_mm) {
   for (const SceneFeature* f : sheet)
     for (const SceneFeature* g : sheet)
@@ -107,47 +117,38 @@ Border border_of(const SceneFeatures& scene, const Sheet& sheet, double off_plan
   return border;
 }
 
-/// Ids of the primitives that are too large for the part, as flags. Upright planes that go on in each other over more
-/// than a part are one wall; not level ones, for plates that lie side by side have their upper faces in one plane.
+/// Ids of the primitives that are too large for the part, as flags. Upright planes that are longer than any face of it,
+/// or go on in each other over as much, are walls; not level ones, for plates that lie side by side have their upper
+/// faces in one plane.
 std::vector<bool> background_flags(const SceneFeatures& scene, const Part& part) {
   const Scale scale = scale_of(part);
   std::vector<bool> background = scene.floor;
   background.resize(scene.primitives->items.size() + 1, false);
-  const auto flag = [&](const SceneFeature& f) { background[static_cast<std::size_t>(f.primitive->id)] = true; };
+  const auto flagged = [&](const SceneFeature& f) -> std::vector<bool>::reference {
+    return background[static_cast<std::size_t>(f.primitive->id)];
+  };
   const SceneFeature* ground = nullptr;
   for (const SceneFeature& f : scene.features) {
-    if (f.reach_mm <= scale.reach_mm) continue;
-    flag(f);
-    if (f.primitive->type == PrimitiveType::plane &&
+    if (f.reach_mm > scale.reach_mm) flagged(f) = true;
+    if (flagged(f) && f.primitive->type == PrimitiveType::plane &&
         (ground == nullptr || f.primitive->surfels.size() > ground->primitive->surfels.size()))
       ground = &f;
   }
   if (ground == nullptr) return background;
   constexpr double kDraft = 20 * kDegree;  // of the walls of bins
   for (const Sheet& sheet : sheets_of(scene, scale.off_plane_mm))
-    if (sheet.size() > 1 && reaches_further(sheet, scale.reach_mm) &&
-        std::abs(sheet[0]->primitive->axis.dot(ground->primitive->axis)) < std::sin(kDraft))
-      for (const SceneFeature* f : sheet) flag(*f);
+    if (std::abs(sheet[0]->primitive->axis.dot(ground->primitive->axis)) < std::sin(kDraft) &&
+        extent_mm(sheet) > 1.1 * part.largest_face_mm)
+      for (const SceneFeature* f : sheet) flagged(*f) = true;
   return background;
 }
 
 /// The cells of some primitives, as flags.
 Image<std::uint8_t> cells_of(const SceneFeatures& scene, const std::vector<bool>& primitives) {
-  const Image<std::int32_t>& grid = scene.surfels->surfel_of_cell;
-  Image<std::uint8_t> out(grid.width, grid.height, 0);
-  for (std::size_t i = 0; i < grid.size(); ++i)
-    if (grid.data[i] >= 0)
-      out.data[i] = primitives[static_cast<std::size_t>(
-          scene.primitives->label_of_surfel[static_cast<std::size_t>(grid.data[i])])];
+  const Image<std::int32_t>& label = scene.label_of_cell;
+  Image<std::uint8_t> out(label.width, label.height, 0);
+  for (std::size_t i = 0; i < label.size(); ++i) out.data[i] = primitives[static_cast<std::size_t>(label.data[i])];
   return out;
-}
-
-/// Local sd of z at a cell [mm].
-double local_sigma(const Surfels& surfels, std::size_t cell) {
-  const Image<float>& tiles = surfels.local_sigma_mm;
-  const int i = static_cast<int>(cell) % surfels.surfel_of_cell.width,
-            j = static_cast<int>(cell) / surfels.surfel_of_cell.width;
-  return tiles(std::min(i / 8, tiles.width - 1), std::min(j / 8, tiles.height - 1));
 }
 
 }  // namespace
@@ -160,7 +161,7 @@ Image<std::uint8_t> background_cells(const SceneFeatures& scene, const Part& par
   const double loudest = 0.015 * part.diameter_mm;
   for (std::size_t i = 0; i < grid.size(); ++i)
     if (grid.data[i] >= 0)
-      out.data[i] = out.data[i] || local_sigma(*scene.surfels, i) > loudest || scene.claimed.holds(i);
+      out.data[i] = out.data[i] || local_sigma_mm(*scene.surfels, i) > loudest || scene.claimed.holds(i);
   return out;
 }
 

@@ -5,6 +5,67 @@
 
 namespace tribin {
 
+namespace {
+
+/// The surfels of a plane that are extreme in directions every 22.5 deg.
+std::vector<Vec3f> ends_of(const Primitive& plane, const Surfels& surfels) {
+  Vec3 u, v;
+  orthonormal_basis(plane.axis, u, v);
+  std::vector<Vec3f> out;
+  constexpr int kDirections = 8;
+  for (int k = 0; k < kDirections; ++k) {
+    const double a = kPi * k / kDirections;
+    const Vec3f d = (u * std::cos(a) + v * std::sin(a)).cast<float>();
+    const auto [low, high] = std::minmax_element(
+        plane.surfels.begin(), plane.surfels.end(),
+        [&](std::uint32_t s, std::uint32_t t) { return surfels.position[s].dot(d) < surfels.position[t].dot(d); });
+    if (low == plane.surfels.end()) break;
+    out.push_back(surfels.position[*low]);
+    out.push_back(surfels.position[*high]);
+  }
+  return out;
+}
+
+/// Planes grow over cells beside them that no primitive has: their normals are spoiled by noise or by an edge, but they
+/// lie in the plane within what one pixel's noise is.
+Image<std::int32_t> label_cells(const SceneFeatures& scene) {
+  const Surfels& surfels = *scene.surfels;
+  const Image<std::int32_t>& grid = surfels.surfel_of_cell;
+  Image<std::int32_t> out(grid.width, grid.height, 0);
+  std::vector<const Primitive*> plane(scene.primitives->items.size() + 1, nullptr);
+  for (const SceneFeature& f : scene.features)
+    if (f.primitive->type == PrimitiveType::plane) plane[static_cast<std::size_t>(f.primitive->id)] = f.primitive;
+  constexpr double kSigmas = 3;  // of one pixel: what pixels have in common no mean over a cell takes away
+  std::vector<std::size_t> border;
+  for (std::size_t i = 0; i < grid.size(); ++i) {
+    if (grid.data[i] < 0) continue;
+    out.data[i] = scene.primitives->label_of_surfel[static_cast<std::size_t>(grid.data[i])];
+    if (plane[static_cast<std::size_t>(out.data[i])] != nullptr) border.push_back(i);
+  }
+  for (std::size_t next = 0; next < border.size(); ++next) {
+    const std::int32_t id = out.data[border[next]];
+    const Primitive& p = *plane[static_cast<std::size_t>(id)];
+    const int x = static_cast<int>(border[next]) % grid.width, y = static_cast<int>(border[next]) / grid.width;
+    for (const auto& [i, j] : {std::pair{x - 1, y}, {x + 1, y}, {x, y - 1}, {x, y + 1}}) {
+      if (!grid.contains(i, j) || grid(i, j) < 0 || out(i, j) != 0) continue;
+      const Vec3 point = surfels.position[static_cast<std::size_t>(grid(i, j))].cast<double>();
+      if (std::abs(p.axis.dot(point) - p.offset_mm) > kSigmas * local_sigma_mm(surfels, grid.index(i, j))) continue;
+      out(i, j) = id;
+      border.push_back(grid.index(i, j));
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
+double local_sigma_mm(const Surfels& surfels, std::size_t cell) {
+  const Image<float>& tiles = surfels.local_sigma_mm;
+  const int i = static_cast<int>(cell) % surfels.surfel_of_cell.width,
+            j = static_cast<int>(cell) / surfels.surfel_of_cell.width;
+  return tiles(std::min(i / 8, tiles.width - 1), std::min(j / 8, tiles.height - 1));
+}
+
 SceneFeatures make_scene_features(const Primitives& primitives, const PrimitiveModel& observation,
                                   const Surfels& surfels) {
   SceneFeatures out;
@@ -22,8 +83,10 @@ SceneFeatures make_scene_features(const Primitives& primitives, const PrimitiveM
     if (area > 0) f.centroid = sum / area;
     for (const std::uint32_t s : p.surfels)
       f.reach_mm = std::max(f.reach_mm, (surfels.position[s].cast<double>() - f.centroid).norm());
+    if (p.type == PrimitiveType::plane) f.ends = ends_of(p, surfels);
     out.features.push_back(f);
   }
+  out.label_of_cell = label_cells(out);
   return out;
 }
 

@@ -23,6 +23,7 @@ struct SceneFeature {
   const Primitive* primitive = nullptr;
   Vec3 centroid = Vec3::Zero();  ///< of its surfels, by area
   double reach_mm = 0;           ///< largest distance of a surfel from the centroid
+  std::vector<Vec3f> ends;       ///< of a plane: surfels that are extreme in its directions, every 22.5 deg
 };
 
 /// The scene as the generators see it.
@@ -30,6 +31,9 @@ struct SceneFeatures {
   std::vector<SceneFeature> features;  ///< one a primitive of the observation, same order
   const Surfels* surfels = nullptr;
   const Primitives* primitives = nullptr;
+  /// Of each cell the id of its primitive, 0 = none: cells that no primitive has go to the plane beside them in which
+  /// they lie, as far as the noise of one pixel tells.
+  Image<std::int32_t> label_of_cell;
   std::vector<bool> floor;  ///< find_floors: by id of primitive; empty = not looked for
   CellMask claimed;         ///< cells that an accepted instance explains
   /// Points that were explained since the same search was made last, thinned; none = it is made for the first time, and
@@ -39,6 +43,9 @@ struct SceneFeatures {
   /// May a search end otherwise here than it did last? \param reach_mm  how far what it looks at lies away.
   bool changed_near(const Vec3f& point, double reach_mm) const;
 };
+
+/// Local sd of z of one pixel at a cell [mm].
+double local_sigma_mm(const Surfels& surfels, std::size_t cell);
 
 /// Marks cells as explained and drops the features that lie in them.
 void claim_cells(SceneFeatures& scene, const CellMask& mask);

@@ -102,28 +102,31 @@ Pose settled_on_few(const SceneDepth& scene, const Part& part, const Pose& pose,
 
 std::vector<Pose> rivals(const SceneDepth& scene, const Part& part, const Pose& pose) {
   std::vector<Pose> out;
-  const auto score = [&](const Pose& p, double tolerance) {
+  // By how much it explains, not by what share of itself: of a rival much more may be hidden.
+  const auto explained = [&](const Pose& p, double tolerance) {
     const PartView& view = view_of(part, p);
-    return look_up(scene, p, view.points, view.normals, 256, std::max(tolerance, 4 * scene.median_sigma_mm)).score();
+    return covered_pixels(part, scene, p) *
+           look_up(scene, p, view.points, view.normals, 256, std::max(tolerance, 4 * scene.median_sigma_mm)).score();
   };
   // A rival that a few looks already put far behind is none.
   constexpr double kBehind = 0.3;
-  const double near = 0.02 * part.diameter_mm, own = score(pose, near);
+  const double near = 0.02 * part.diameter_mm,
+               enough = explained(pose, near) - kBehind * covered_pixels(part, scene, pose);
   for (const SelfSimilarPose& s : part.self_similar)
-    if (const Pose other = pose * s.part_from_part; score(other, near) > own - kBehind) out.push_back(other);
+    if (const Pose other = pose * s.part_from_part; explained(other, near) > enough) out.push_back(other);
   // Half turns bring a face onto itself but nearly.
   const std::vector<const Primitive*> seen = mostly_seen(scene, part, pose);
   std::vector<Pose> halves;
   add_half_turns(seen, pose, halves);
   const double roughly = 0.05 * part.diameter_mm;
   for (const Pose& other : halves)
-    if (score(other, roughly) > own - kBehind) out.push_back(other);
+    if (explained(other, roughly) > enough) out.push_back(other);
   if (part.nearly_round.empty()) {
     std::vector<Pose> faces;
     add_face_for_face(part, seen, pose, faces);
     std::vector<std::pair<double, std::size_t>> order;
     for (std::size_t i = 0; i < faces.size(); ++i)
-      if (const double s = score(faces[i], roughly); s > own - kBehind) order.emplace_back(-s, i);
+      if (const double e = explained(faces[i], roughly); e > enough) order.emplace_back(-e, i);
     std::sort(order.begin(), order.end());
     constexpr std::size_t kLikely = 8;
     std::vector<Pose> distinct = {pose};  // equal faces, and a face that is its own, make one pose many times
@@ -139,7 +142,7 @@ std::vector<Pose> rivals(const SceneDepth& scene, const Part& part, const Pose& 
   std::vector<Pose> over;
   add_turned_over(part, part.nearly_round[0], pose, over);
   for (const Pose& other : over)
-    if (score(other, roughly) > own - kBehind) out.push_back(other);
+    if (explained(other, roughly) > enough) out.push_back(other);
   // Turned over, a nearly round part has a spin of its own, that no motion of the part tells: the likeliest two stand
   // for all of that side. A tooth beside a tooth of the scan, it would look worse than it is.
   const SymmetryGroup round = {{}, part.nearly_round};

@@ -49,6 +49,7 @@ struct Part {
   Vec3 box_min = Vec3::Zero();
   Vec3 box_max = Vec3::Zero();
   double diameter_mm = 0;  ///< largest distance between two vertices
+  double largest_face_mm = 0;  ///< no piece of surface that may be taken for one plane is longer (flat_extent.hpp)
   double area_mm2 = 0;
   double gyration_mm = 0;  ///< rms distance of the surface from the box centre: turns radians into mm
   SymmetryGroup symmetry;

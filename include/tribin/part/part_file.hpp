@@ -19,7 +19,7 @@ namespace tribin {
 //   56     payload: the fields of Part in the order of part.hpp, each as it stands in memory; a list is its count (8
 //          bytes) and its elements, a bool or an enum one byte
 
-inline constexpr std::uint32_t kPartFileVersion = 6;  ///< one more with each change of the layout or of a field's sense
+inline constexpr std::uint32_t kPartFileVersion = 7;  ///< one more with each change of the layout or of a field's sense
 
 /// The part as bytes that part_from_bytes reads back: equal in every bit.
 std::string bytes_of_part(const Part& part, const ContentHash& key);
