@@ -19,8 +19,10 @@ namespace {
 double probability(const Verification& v) {
   // Few samples of an outline say little: they count beside eight of the mean of right poses.
   const double contour = (v.outline_breaks + 8 * 0.97) / (v.outline + 8);
+  // Flying pixels let a hundredth of a right pose be looked through at most; each further one costs half a nat.
+  const double looked_through = std::max(0.0, v.free_space() - 0.015);
   const double x = 18 * v.support() + 15 * contour + 2 * std::log(std::max(1e-3, v.measured_fraction())) +
-                   2 * std::log10(1 + std::min(100, v.outline)) - 29.4;
+                   2 * std::log10(1 + std::min(100, v.outline)) - 29.4 - 50 * looked_through;
   return 1 / (1 + std::exp(-x));
 }
 

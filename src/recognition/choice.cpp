@@ -134,21 +134,40 @@ namespace {
 // below 0.85, or contours below 0.75 on little of the part, which the score tells.
 constexpr double kSupport = 0.85, kFreeSpace = 0.08, kContour = 0.65;
 
-/// \param slack  share of its surface that the pose may have wrong.
-bool keeps_limits(const Part& part, const PoseCandidate& candidate, double slack, std::vector<Reason>& rejected) {
-  const Verification& v = candidate.verification;
-  const auto fails = [&](const char* test, double value, double limit, bool bad) {
-    if (bad) add_reason(rejected, {part.name, "verification", test, value, limit, 1, place_of(part, candidate)});
+/// Tests of one candidate, whose value and limit are told when one fails.
+struct Test {
+  const Part& part;
+  const PoseCandidate& candidate;
+  std::vector<Reason>& rejected;
+
+  bool fails(const char* what, double value, double limit, bool bad) const {
+    if (bad) add_reason(rejected, {part.name, "verification", what, value, limit, 1, place_of(part, candidate)});
     return bad;
-  };
+  }
+};
+
+/// Is enough of it seen?
+bool shows_enough(const Part& part, const PoseCandidate& candidate, std::vector<Reason>& rejected) {
+  const Verification& v = candidate.verification;
+  const Test test{part, candidate, rejected};
   // 40 supported pixels fix a pose no better than chance does; less is not a look at a part.
-  if (fails("pixels", v.supported, 40, v.supported < 40)) return false;
-  if (fails("measured_fraction", v.measured_fraction(), kLeastMeasured, v.measured_fraction() < kLeastMeasured))
-    return false;
-  if (fails("free_space", v.free_space(), kFreeSpace + slack, v.free_space() > kFreeSpace + slack)) return false;
-  if (fails("support", v.support(), kSupport - slack, v.support() < kSupport - slack)) return false;
-  if (fails("contour", v.contour(), kContour - slack, v.contour() < kContour - slack)) return false;
-  return true;
+  return !test.fails("pixels", v.supported, 40, v.supported < 40) &&
+         !test.fails("measured_fraction", v.measured_fraction(), kLeastMeasured,
+                     v.measured_fraction() < kLeastMeasured);
+}
+
+/// Does what is seen agree?
+/// \param slack  share of its surface that the pose may have wrong.
+bool agrees(const Part& part, const PoseCandidate& candidate, double slack, std::vector<Reason>& rejected) {
+  const Verification& v = candidate.verification;
+  const Test test{part, candidate, rejected};
+  return !test.fails("free_space", v.free_space(), kFreeSpace + slack, v.free_space() > kFreeSpace + slack) &&
+         !test.fails("support", v.support(), kSupport - slack, v.support() < kSupport - slack) &&
+         !test.fails("contour", v.contour(), kContour - slack, v.contour() < kContour - slack);
+}
+
+bool keeps_limits(const Part& part, const PoseCandidate& candidate, double slack, std::vector<Reason>& rejected) {
+  return shows_enough(part, candidate, rejected) && agrees(part, candidate, slack, rejected);
 }
 
 Polished polish_once(const SceneDepth& scene, std::span<const Part> parts, const PoseCandidate& settled,
@@ -302,15 +321,12 @@ bool hopeful(const Part& part, const PoseCandidate& candidate, std::vector<Reaso
   // standard deviations besides.
   constexpr double kSlack = 0.3;
   const Verification& v = candidate.verification;
-  const auto fails = [&](const char* test, double value, double limit, bool bad) {
-    if (bad) add_reason(rejected, {part.name, "verification", test, value, limit, 1, place_of(part, candidate)});
-    return bad;
-  };
+  const Test test{part, candidate, rejected};
   const double contour = kContour - kSlack - 1 / std::sqrt(std::max(1, v.outline));
-  return !fails("measured_fraction", v.measured_fraction(), 0.17, v.measured_fraction() < 0.17) &&
-         !fails("free_space", v.free_space(), kFreeSpace + kSlack, v.free_space() > kFreeSpace + kSlack) &&
-         !fails("support", v.support(), kSupport - kSlack, v.support() < kSupport - kSlack) &&
-         !fails("contour", v.contour(), contour, v.contour() < contour);
+  return !test.fails("measured_fraction", v.measured_fraction(), 0.17, v.measured_fraction() < 0.17) &&
+         !test.fails("free_space", v.free_space(), kFreeSpace + kSlack, v.free_space() > kFreeSpace + kSlack) &&
+         !test.fails("support", v.support(), kSupport - kSlack, v.support() < kSupport - kSlack) &&
+         !test.fails("contour", v.contour(), contour, v.contour() < contour);
 }
 
 bool plausible(const Part& part, const PoseCandidate& settled, std::vector<Reason>& rejected) {
@@ -319,6 +335,11 @@ bool plausible(const Part& part, const PoseCandidate& settled, std::vector<Reaso
 
 bool acceptable(const Part& part, const PoseCandidate& candidate, std::vector<Reason>& rejected) {
   return keeps_limits(part, candidate, 0, rejected);
+}
+
+bool shows_too_little(const Part& part, const PoseCandidate& candidate) {
+  std::vector<Reason> ignored;
+  return !shows_enough(part, candidate, ignored) && agrees(part, candidate, 0, ignored);
 }
 
 }  // namespace tribin

@@ -49,4 +49,7 @@ inline constexpr double kLeastMeasured = 0.2;
 /// Limits that an answer must keep. Value and limit go into `rejected` when one fails.
 bool acceptable(const Part& part, const PoseCandidate& candidate, std::vector<Reason>& rejected);
 
+/// Is nothing against it but that little of it is seen?
+bool shows_too_little(const Part& part, const PoseCandidate& candidate);
+
 }  // namespace tribin

@@ -66,7 +66,14 @@ Place place_of_candidate(const Field& field, std::size_t i, std::size_t parts) {
 }
 
 /// Fits, polishes and ranks the rivals of a place.
-void settle(const SceneDepth& scene, std::span<const Part> parts, const Field& field, Place& place) {
+/// \param hidden  poses that show too little to be answers, but may be likelier than what wants their cells.
+void settle(const SceneDepth& scene, std::span<const Part> parts, const Field& field, std::span<const Polished> hidden,
+            Place& place) {
+  std::vector<const Polished*> here;
+  for (const Polished& h : hidden)
+    if (overlap(h.mask, place.cells) > kOverlap) here.push_back(&h);
+  for (const Polished* h : here)
+    place.also[static_cast<std::size_t>(h->candidate.part)].push_back(h->candidate.camera_from_part);
   std::vector<std::size_t> hopefuls;
   for (const std::size_t k : place.rivals) {
     const PoseCandidate& c = field.candidates[k];
@@ -98,6 +105,10 @@ void settle(const SceneDepth& scene, std::span<const Part> parts, const Field& f
     }
   }
   if (place.polished.empty()) return;
+  for (const Polished* h : here)
+    if (std::none_of(place.polished.begin(), place.polished.end(),
+                     [&](const Polished& p) { return p.candidate.part == h->candidate.part; }))
+      place.polished.push_back(*h);
   std::vector<std::pair<const Part*, Pose>> poses;
   for (const Polished& p : place.polished)
     poses.emplace_back(&parts[static_cast<std::size_t>(p.candidate.part)], p.candidate.camera_from_part);
@@ -182,7 +193,7 @@ std::vector<Polished> choose_winners(const SceneFeatures& features, const SceneD
     if (places.empty()) break;
     const double begun_ms = budget.elapsed_ms();
     parallel_each(static_cast<int>(places.size()),
-                  [&](int i) { settle(scene, parts, field, places[static_cast<std::size_t>(i)]); });
+                  [&](int i) { settle(scene, parts, field, refused.hidden, places[static_cast<std::size_t>(i)]); });
     const double took_ms = (budget.elapsed_ms() - begun_ms) / static_cast<double>(places.size());
 
     for (Place& place : places) {
@@ -201,6 +212,7 @@ std::vector<Polished> choose_winners(const SceneFeatures& features, const SceneD
       };
       if (!acceptable(part, winner.candidate, rejected) || !own_surface()) {
         for (const std::size_t k : place.rivals) refused.candidates.push_back(field.candidates[k]);
+        if (shows_too_little(part, winner.candidate)) refused.hidden.push_back(std::move(winner));
         continue;
       }
       if (taken(winner.candidate, winner.mask)) continue;

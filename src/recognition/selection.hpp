@@ -12,6 +12,8 @@ namespace tribin {
 /// surface and outline is so whatever else the scan holds.
 struct Refused {
   std::vector<PoseCandidate> candidates;
+  /// The likeliest at their places, that show too little: what is less likely there is not right for showing more.
+  std::vector<Polished> hidden;
 
   bool holds(std::span<const Part> parts, const PoseCandidate& c) const;
 };
