@@ -9,14 +9,8 @@
 namespace tribin {
 namespace {
 
-/// What is large and what is small for parts.
-struct Scale {
-  double reach_mm;      ///< what reaches further is no piece of one; noise and a merged neighbour add a tenth
-  double off_plane_mm;  ///< by which nothing goes on in a plane: by less than a part is thick
-};
-
-/// A piece of a part reaches at most its diameter from its own centroid.
-Scale scale_of(const Part& part) { return {1.1 * part.diameter_mm, 0.01 * part.diameter_mm}; }
+constexpr double kLarger = 1.1;     // noise and a merged neighbour add a tenth
+constexpr double kOffPlane = 0.01;  // of the diameter, by which nothing goes on in a plane: less than a part is thick
 
 /// Is one plane the other's going on, behind what stands in front? Within 3 deg: what a warped wall bends and a small
 /// piece's normal is unsure by.
@@ -24,10 +18,6 @@ bool goes_on_in(const SceneFeature& f, const SceneFeature& g, double off_plane_m
   return f.primitive->axis.dot(g.primitive->axis) > std::cos(3 * kDegree) &&
          std::abs(f.primitive->axis.dot(g.centroid - f.centroid)) < off_plane_mm &&
          std::abs(g.primitive->axis.dot(f.centroid - g.centroid)) < off_plane_mm;
-}
-
-double reach_together_mm(const SceneFeature& f, const SceneFeature& g) {
-  return 0.5 * ((f.centroid - g.centroid).norm() + f.reach_mm + g.reach_mm);
 }
 
 using Sheet = std::vector<const SceneFeature*>;
@@ -60,13 +50,6 @@ double extent_mm(const Sheet& sheet) {
   for (std::size_t i = 0; i < ends.size(); ++i)
     for (std::size_t k = 0; k < i; ++k) largest = std::max(largest, (ends[i] - ends[k]).squaredNorm());
   return std::sqrt(largest);
-}
-
-bool reaches_further(const Sheet& sheet, double reach_mm) {
-  for (const SceneFeature* f : sheet)
-    for (const SceneFeature* g : sheet)
-      if (reach_together_mm(*f, *g) > reach_mm) return true;
-  return false;
 }
 
 /// What lies beside a sheet, in cells of its border: nearer than its plane, farther, or nothing at all.
@@ -117,29 +100,31 @@ Border border_of(const SceneFeatures& scene, const Sheet& sheet, double off_plan
   return border;
 }
 
-/// Ids of the primitives that are too large for the part, as flags. Upright planes that are longer than any face of it,
-/// or go on in each other over as much, are walls; not level ones, for plates that lie side by side have their upper
-/// faces in one plane.
+/// Ids of the primitives that are too large for the part, as flags. Bottoms and upright planes that are longer than any
+/// face of it, or go on in each other over as much, are floors and walls; not other level ones, for plates that lie
+/// side by side have their upper faces in one plane.
 std::vector<bool> background_flags(const SceneFeatures& scene, const Part& part) {
-  const Scale scale = scale_of(part);
+  const double longest_mm = kLarger * part.largest_face_mm;
   std::vector<bool> background = scene.floor;
   background.resize(scene.primitives->items.size() + 1, false);
-  const auto flagged = [&](const SceneFeature& f) -> std::vector<bool>::reference {
-    return background[static_cast<std::size_t>(f.primitive->id)];
-  };
+  const auto flagged = [&](int id) -> std::vector<bool>::reference { return background[static_cast<std::size_t>(id)]; };
+  for (const SceneFeatures::Bottom& bottom : scene.bottoms)
+    if (bottom.extent_mm > longest_mm)
+      for (const int id : bottom.primitives) flagged(id) = true;
   const SceneFeature* ground = nullptr;
   for (const SceneFeature& f : scene.features) {
-    if (f.reach_mm > scale.reach_mm) flagged(f) = true;
-    if (flagged(f) && f.primitive->type == PrimitiveType::plane &&
+    // A piece of a part reaches at most its diameter from its own centroid.
+    if (f.reach_mm > kLarger * part.diameter_mm) flagged(f.primitive->id) = true;
+    if (flagged(f.primitive->id) && f.primitive->type == PrimitiveType::plane &&
         (ground == nullptr || f.primitive->surfels.size() > ground->primitive->surfels.size()))
       ground = &f;
   }
   if (ground == nullptr) return background;
   constexpr double kDraft = 20 * kDegree;  // of the walls of bins
-  for (const Sheet& sheet : sheets_of(scene, scale.off_plane_mm))
+  for (const Sheet& sheet : sheets_of(scene, kOffPlane * part.diameter_mm))
     if (std::abs(sheet[0]->primitive->axis.dot(ground->primitive->axis)) < std::sin(kDraft) &&
-        extent_mm(sheet) > 1.1 * part.largest_face_mm)
-      for (const SceneFeature* f : sheet) flagged(*f) = true;
+        extent_mm(sheet) > longest_mm)
+      for (const SceneFeature* f : sheet) flagged(f->primitive->id) = true;
   return background;
 }
 
@@ -165,18 +150,27 @@ Image<std::uint8_t> background_cells(const SceneFeatures& scene, const Part& par
   return out;
 }
 
-void find_floors(SceneFeatures& scene, std::span<const Part> parts) {
+void find_floors(SceneFeatures& scene, std::span<const Part> parts, double sigma_mm) {
+  scene.bottoms.clear();
   scene.floor.assign(scene.primitives->items.size() + 1, false);
-  // No part has a face that reaches further: what is seen of one is at most all of it.
-  Scale scale = {0, 1e30};
+  double smallest = 1e30, shortest = 1e30, longest = 0;
   for (const Part& part : parts) {
-    scale.off_plane_mm = std::min(scale.off_plane_mm, scale_of(part).off_plane_mm);
-    for (const PartFeature& face : visible_features(part, PrimitiveType::plane, part.model.primitives.size()))
-      scale.reach_mm = std::max(scale.reach_mm, 1.1 * face.reach_mm);
+    smallest = std::min(smallest, part.diameter_mm);
+    shortest = std::min(shortest, part.largest_face_mm);
+    longest = std::max(longest, part.largest_face_mm);
   }
-  for (const Sheet& sheet : sheets_of(scene, scale.off_plane_mm))
-    if (reaches_further(sheet, scale.reach_mm) && border_of(scene, sheet, scale.off_plane_mm).of_floor())
-      for (const SceneFeature* f : sheet) scene.floor[static_cast<std::size_t>(f->primitive->id)] = true;
+  // Of a floor in pieces, each is fitted by itself, and a smooth error of the sensor is as large as its noise.
+  const double off_plane_mm = std::max(kOffPlane * smallest, 2 * sigma_mm);
+  for (const Sheet& sheet : sheets_of(scene, off_plane_mm)) {
+    SceneFeatures::Bottom bottom;
+    bottom.extent_mm = extent_mm(sheet);
+    if (bottom.extent_mm <= kLarger * shortest || !border_of(scene, sheet, off_plane_mm).of_floor()) continue;
+    for (const SceneFeature* f : sheet) {
+      bottom.primitives.push_back(f->primitive->id);
+      if (bottom.extent_mm > kLarger * longest) scene.floor[static_cast<std::size_t>(f->primitive->id)] = true;
+    }
+    scene.bottoms.push_back(std::move(bottom));
+  }
 }
 
 Image<std::uint8_t> floor_cells(const SceneFeatures& scene) { return cells_of(scene, scene.floor); }

@@ -34,8 +34,14 @@ struct SceneFeatures {
   /// Of each cell the id of its primitive, 0 = none: cells that no primitive has go to the plane beside them in which
   /// they lie, as far as the noise of one pixel tells.
   Image<std::int32_t> label_of_cell;
-  std::vector<bool> floor;  ///< find_floors: by id of primitive; empty = not looked for
-  CellMask claimed;         ///< cells that an accepted instance explains
+  /// Planes, each in one piece or in many, that end nowhere before something farther away.
+  struct Bottom {
+    std::vector<int> primitives;  ///< ids
+    double extent_mm = 0;         ///< largest distance between two of its points
+  };
+  std::vector<Bottom> bottoms;  ///< find_floors: longer than any face of the smallest part
+  std::vector<bool> floor;      ///< find_floors: by id of primitive; empty = not looked for
+  CellMask claimed;             ///< cells that an accepted instance explains
   /// Points that were explained since the same search was made last, thinned; none = it is made for the first time, and
   /// looks everywhere. Elsewhere it would end as it did.
   std::optional<std::vector<Vec3f>> fresh;
@@ -70,9 +76,10 @@ std::vector<PartFeature> visible_features(const Part& part, PrimitiveType type, 
 /// a floor, a wall of the bin), or to an accepted instance.
 Image<std::uint8_t> background_cells(const SceneFeatures& scene, const Part& part);
 
-/// Finds floors: planes, in one piece or in many, that reach further than any face of a part and end nowhere before
-/// something farther away.
-void find_floors(SceneFeatures& scene, std::span<const Part> parts);
+/// Finds floors: bottoms that are longer than any face of the parts. What is longer than any face of one of them is
+/// background to it alone, for under a large part there may be others.
+/// \param sigma_mm  the scan's noise.
+void find_floors(SceneFeatures& scene, std::span<const Part> parts, double sigma_mm);
 /// Flags the cells of floors: no part lies behind them.
 Image<std::uint8_t> floor_cells(const SceneFeatures& scene);
 

@@ -58,7 +58,7 @@ Instances recognize(const Primitives& primitives, const PrimitiveModel& observat
   SceneDepth scene = make_scene_depth(*surfels.scan, surfels);
   SceneFeatures features = make_scene_features(primitives, observation, surfels);
 
-  find_floors(features, parts);
+  find_floors(features, parts, scene.median_sigma_mm);
   scene.floor = floor_cells(features);
   Image<std::uint8_t> in_bin;
   if (options.bin != nullptr) {

@@ -19,11 +19,15 @@ double overlap(const CellMask& a, const CellMask& b) {
 }
 
 /// Share of the cells a pose explains that are no background: a face that lies in a wall or a floor is seen nowhere.
-double own_share(const CellMask& mask, const Image<std::uint8_t>& background) {
-  if (mask.count == 0) return 0;
-  int own = 0;
-  for (std::size_t i = 0; i < background.size(); ++i) own += mask.holds(i) && !background.data[i];
-  return double(own) / mask.count;
+/// What has no surfel, an edge or a hole, is nobody's.
+double own_share(const CellMask& mask, const Image<std::uint8_t>& background, const Image<std::int32_t>& surfel) {
+  int all = 0, own = 0;
+  for (std::size_t i = 0; i < background.size(); ++i) {
+    if (!mask.holds(i) || surfel.data[i] < 0) continue;
+    ++all;
+    own += !background.data[i];
+  }
+  return all > 0 ? double(own) / all : 0;
 }
 
 /// A place of the scan and the poses that want it.
@@ -204,7 +208,7 @@ std::vector<Polished> choose_winners(const SceneFeatures& features, const SceneD
       const Part& part = part_of(winner.candidate);
       const auto own_surface = [&] {
         const double own = winner.candidate.verification.measured_fraction() *
-                           own_share(winner.mask, background_cells(features, part));
+                           own_share(winner.mask, background_cells(features, part), features.surfels->surfel_of_cell);
         if (own < kLeastMeasured)
           add_reason(rejected, {part.name, "verification", "own_surface", own, kLeastMeasured, 1,
                                 place_of(part, winner.candidate)});

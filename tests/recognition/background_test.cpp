@@ -37,7 +37,7 @@ FloorShares floor_shares(const Scan& scan) {
   const Primitives primitives = segment(surfels);
   const PrimitiveModel model = build_model(primitives, surfels);
   SceneFeatures scene = make_scene_features(primitives, model, surfels);
-  find_floors(scene, std::span(&plate(), 1));
+  find_floors(scene, std::span(&plate(), 1), 0.1);
   const Image<std::uint8_t> floor = floor_cells(scene);
   std::array<int, 2> all{}, flagged{};
   for (std::size_t s = 0; s < surfels.cell.size(); ++s) {
