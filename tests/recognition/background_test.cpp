@@ -92,5 +92,66 @@ TEST(Floors, PlatesThatLieSideBySideAreNone) {
   }
 }
 
+/// Shorter than the part's diameter from its middle to its ends, but longer than any of its faces.
+TEST(Walls, AreLongerThanAnyFaceOfThePart) {
+  const Mesh cube = test::prism(test::rectangle(26, 26), 52);
+  const Mesh wall = test::prism(test::rectangle(3, 50), 60);
+  const Part part = compile_part(cube);
+  EXPECT_NEAR(part.largest_face_mm, 52 * std::sqrt(2.0), 2);
+  for (unsigned seed = 1; seed <= 4; ++seed) {
+    SCOPED_TRACE(seed);
+    const double turn = 0.1 * seed;
+    const Scan scan = scan_of({{&wall, on_table(150, 0, 0)}, {&cube, on_table(-110, 10, turn)}}, seed);
+    const Surfels surfels = surfels_from_scan(scan);
+    const Primitives primitives = segment(surfels);
+    const PrimitiveModel model = build_model(primitives, surfels);
+    SceneFeatures scene = make_scene_features(primitives, model, surfels);
+    find_floors(scene, std::span(&part, 1), 0.1);
+    const Image<std::uint8_t> background = background_cells(scene, part);
+    std::array<int, 2> all{}, flagged{};  // of the wall's face, of the cube
+    for (std::size_t s = 0; s < surfels.size(); ++s) {
+      const Vec3f& p = surfels.position[s];
+      if (kTable - p.z() < 5 || (p.x() > 0 && kTable - p.z() > 55)) continue;  // the foot, the wall's narrow top
+      ++all[p.x() < 0];
+      flagged[p.x() < 0] += background.data[surfels.cell[s]];
+    }
+    ASSERT_GT(all[0], 50);
+    ASSERT_GT(all[1], 50);
+    EXPECT_GT(flagged[0], 0.7 * all[0]);
+    EXPECT_EQ(flagged[1], 0);
+  }
+}
+
+/// Loud noise spoils normals, so that many cells belong to no primitive.
+TEST(Planes, TakeInTheCellsBesideThemThatLieInThem) {
+  for (unsigned seed = 1; seed <= 4; ++seed) {
+    SCOPED_TRACE(seed);
+    constexpr double kSigma = 0.6;
+    const Scan scan = test::posed_scan(grid_of_bars(seed), Vec3(0, 0, -1), -kTable, kSigma, 1.5, seed, 960, 768);
+    const Surfels surfels = surfels_from_scan(scan);
+    const Primitives primitives = segment(surfels);
+    const PrimitiveModel model = build_model(primitives, surfels);
+    const SceneFeatures scene = make_scene_features(primitives, model, surfels);
+    int spoiled = 0, taken = 0;
+    for (std::size_t s = 0; s < surfels.size(); ++s) {
+      const std::int32_t label = primitives.label_of_surfel[s], now = scene.label_of_cell.data[surfels.cell[s]];
+      if (label != 0) {
+        EXPECT_EQ(now, label);
+        continue;
+      }
+      if (kTable - surfels.position[s].z() < 2 * kSigma) {
+        ++spoiled;
+        taken += now != 0;
+      }
+      if (now == 0) continue;
+      const Primitive& plane = primitives.items[static_cast<std::size_t>(now) - 1];
+      EXPECT_EQ(plane.type, PrimitiveType::plane);
+      EXPECT_LT(std::abs(plane.axis.dot(surfels.position[s].cast<double>()) - plane.offset_mm), 5 * kSigma);
+    }
+    ASSERT_GT(spoiled, 100);
+    EXPECT_GT(taken, spoiled / 3);  // the others mix the table with the foot of a bar
+  }
+}
+
 }  // namespace
 }  // namespace tribin

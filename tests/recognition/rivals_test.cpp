@@ -48,5 +48,35 @@ TEST(Rivals, AnotherFaceFlushWithTheOneThatIsSeenIsOne) {
   }
 }
 
+/// Of a block half of which lies under a plate as much is seen as of one that stands on end beside the plate: the first
+/// is a rival of the second, though it shows a smaller share of itself.
+TEST(Rivals, AreThoseThatExplainAsMuchThoughMoreOfThemIsHidden) {
+  const Mesh block = test::prism(test::rectangle(45, 26), 37);
+  const Mesh plate = test::prism(test::rectangle(60, 60), 3);
+  const Part part = compile_part(block);
+  for (unsigned seed = 1; seed <= 6; ++seed) {
+    SCOPED_TRACE(seed);
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> turn(0, 2 * kPi);
+    Pose truth = Pose::Identity();
+    truth.linear() = rotation_from_vector(Vec3(kPi, 0, 0)) * rotation_from_vector(Vec3(0, 0, turn(random)));
+    truth.translation() = Vec3(0, 0, 650);
+    constexpr double kEnd = -8;  // of what the plate leaves of the upper face: 37 of 90 mm
+    Pose above = Pose::Identity();
+    above.translation() = Vec3(kEnd + 60, 0, 47);
+    const Scan scan =
+        test::posed_scan({{&block, truth}, {&plate, truth * above}}, Vec3(0, 0, -1), -650, 0.1, 0.6, seed);
+    const Surfels surfels = surfels_from_scan(scan);
+    const SceneDepth scene = make_scene_depth(scan, surfels);
+    Pose on_end = Pose::Identity();  // x up, z along -x
+    on_end.linear() << 0, 0, -1, 0, 1, 0, 1, 0, 0;
+    on_end.translation() = Vec3(kEnd, 0, 37 - 45);
+    const std::vector<Pose> found = rivals(scene, part, truth * on_end);
+    EXPECT_TRUE(std::any_of(found.begin(), found.end(), [&](const Pose& pose) {
+      return close_poses(part, pose, truth, 0.02 * part.diameter_mm, 1 * kDegree);
+    }));
+  }
+}
+
 }  // namespace
 }  // namespace tribin
