@@ -48,7 +48,7 @@ struct Part {
   std::vector<std::int32_t> primitive_of_triangle;  ///< primitive id, 0 = none
   Vec3 box_min = Vec3::Zero();
   Vec3 box_max = Vec3::Zero();
-  double diameter_mm = 0;  ///< largest distance between two vertices
+  double diameter_mm = 0;      ///< largest distance between two vertices
   double largest_face_mm = 0;  ///< no piece of surface that may be taken for one plane is longer (flat_extent.hpp)
   double area_mm2 = 0;
   double gyration_mm = 0;  ///< rms distance of the surface from the box centre: turns radians into mm
