@@ -49,6 +49,16 @@ double share_of_first(const Instance& instance) {
   return share;
 }
 
+/// Of a patch that the fit counted, the information is part of what holds the pose: it cannot know its own distance
+/// better than by itself. Where a patch would (a narrow face seen aslant, whose pixels the fit's smaller patches leave
+/// out), the pose does not follow it, and its errors are none of the pose's.
+void erase_what_holds_nothing(const Matrix6& held, std::vector<ErrorPatch>& patches) {
+  constexpr double kSelf = 1.1;  // sums in float, and a free direction's share
+  std::erase_if(patches, [&](const ErrorPatch& patch) {
+    return patch.pull.dot(Vector6(held * patch.pull)) > kSelf * patch.weight;
+  });
+}
+
 }  // namespace
 
 LastWord last_word(const Polished& p, const Part& part, const SceneDepth& scene, const NoiseProfile& noise) {
@@ -68,8 +78,9 @@ LastWord last_word(const Polished& p, const Part& part, const SceneDepth& scene,
   thread_local IndexRender render;
   render_index(part.render_mesh, scene.camera, pose, step, render);
   out.errors = common_errors(render, scene, noise, pose * part.box_center(), options.cad_sigma_mm);
-  out.field = field_variance(out.errors.patches, noise_covariance(part, out.refined),
-                             6 - static_cast<int>(options.frozen.size()));
+  const Matrix6 held = noise_covariance(part, out.refined);
+  erase_what_holds_nothing(held, out.errors.patches);
+  out.field = field_variance(out.errors.patches, held, 6 - static_cast<int>(options.frozen.size()));
   return out;
 }
 
