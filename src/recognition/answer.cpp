@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "instance_report.hpp"
 #include "tribin/part/symmetry.hpp"
@@ -93,6 +94,12 @@ double common_variance(std::span<const LastWord> all) {
   return weight > 0 ? sum / weight : 0;
 }
 
+void score_again(Answer& answer) {
+  Instance& out = answer.instance;
+  const double before = std::exchange(out.score, answer.place * answer.held * share_of_first(out));
+  if (out.p_within_tolerance && before > 0) *out.p_within_tolerance *= out.score / before;
+}
+
 Answer make_answer(const Polished& p, const LastWord& last, double shared_mm2, const Part& part,
                    const RecognitionOptions& recognition) {
   Answer answer;
@@ -138,7 +145,7 @@ Answer make_answer(const Polished& p, const LastWord& last, double shared_mm2, c
   const auto [place, turn] = predicted_errors(part, out);
   answer.place = probability(v) / (1 + p.class_odds);
   answer.held = probability_below(kSameAnswer * part.diameter_mm, std::hypot(place, turn * 0.5 * part.diameter_mm));
-  out.score = answer.place * answer.held * share_of_first(out);
+  score_again(answer);
   if (recognition.tolerance_mm > 0 || recognition.tolerance_rad > 0) {
     double within = out.score;
     if (recognition.tolerance_mm > 0) within *= probability_below(recognition.tolerance_mm, place);

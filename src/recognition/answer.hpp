@@ -36,4 +36,7 @@ double common_variance(std::span<const LastWord> all);
 Answer make_answer(const Polished& polished, const LastWord& last, double shared_mm2, const Part& part,
                    const RecognitionOptions& recognition);
 
+/// Its score, once its alternatives have changed.
+void score_again(Answer& answer);
+
 }  // namespace tribin

@@ -28,6 +28,40 @@ std::vector<std::unique_ptr<Solid>> solids_of(std::span<const Part> parts, const
   return out;
 }
 
+Body body_of(const Part& part, const Solid& solid, const Pose& pose, const Matrix6& covariance) {
+  Body body;
+  body.solid = &solid;
+  body.points = part.sample_points;
+  body.normals = part.sample_normals;
+  body.camera_from_body = pose;
+  body.covariance = covariance;
+  body.tolerance_mm = form_tolerance_mm(part.diameter_mm) + part.mesh.chord_error_mm + part.coarse_error_mm;
+  return body;
+}
+
+Body body_of(const BinSighting& bin, const Solid& solid) {
+  Body body;
+  body.solid = &solid;
+  body.camera_from_body = bin.camera_from_bin;
+  body.covariance = bin.covariance;
+  body.fixed = true;
+  body.tolerance_mm = bin.tolerance_mm;
+  return body;
+}
+
+Solid solid_of(const BinSighting& bin) {
+  const Mesh mesh = bin_mesh(bin.shape);
+  return {mesh.vertices, mesh.triangles};
+}
+
+/// The covariance of a pose (dt of its origin, w) as that of another pose of the same body.
+Matrix6 covariance_at(const Vec3& origin, const Instance& instance) {
+  const Vec3 arm = origin - instance.camera_from_part.translation();
+  Eigen::Matrix<double, 6, 6> m = Eigen::Matrix<double, 6, 6>::Identity();
+  m.topRightCorner<3, 3>() << 0, arm.z(), -arm.y(), -arm.z(), 0, arm.x(), arm.y(), -arm.x(), 0;
+  return Matrix6(m * Eigen::Matrix<double, 6, 6>(instance.covariance) * m.transpose());
+}
+
 /// The move is taken back where the scan is less likely by more than the raster makes of two poses that are both right.
 bool is_worse(const Part& part, const SceneDepth& scene, const Pose& old_pose, const Pose& new_pose) {
   constexpr double kRaster = 3, kPixels = 10000;
@@ -39,6 +73,44 @@ bool is_worse(const Part& part, const SceneDepth& scene, const Pose& old_pose, c
 
 }  // namespace
 
+void strike_out_in_bin(const Part& part, const BinSighting& bin, Instance& instance) {
+  if (instance.alternatives.empty() || part.render_mesh.two_sided) return;
+  const Solid solid(part.coarse_mesh.vertices, part.coarse_mesh.triangles), bin_solid = solid_of(bin);
+  const auto is_in_bin = [&](const Pose& pose) {
+    const std::array<Body, 2> bodies = {body_of(part, solid, pose, covariance_at(pose.translation(), instance)),
+                                        body_of(bin, bin_solid)};
+    const std::vector<Overlap> found = overlaps(bodies);
+    return !found.empty() && found.front().depth_mm > std::max(found.front().limit_mm, weak_limit_mm(part));
+  };
+  std::vector<Alternative> all = {{instance.camera_from_part, 1, ""}};
+  for (const Alternative& a : instance.alternatives) {
+    all.front().probability -= a.probability;
+    all.push_back(a);
+  }
+  std::vector<Alternative> clear;
+  double sum = 0;
+  for (const Alternative& a : all) {
+    if (is_in_bin(a.camera_from_part)) continue;
+    clear.push_back(a);
+    sum += a.probability;
+  }
+  // All in the bin: what is said of one is said of all, and the pose itself is looked at later (keep_apart).
+  if (clear.empty() || clear.size() == all.size()) return;
+  for (Alternative& a : clear) a.probability /= sum;
+  const auto best = std::max_element(clear.begin(), clear.end(), [](const Alternative& a, const Alternative& b) {
+    return a.probability < b.probability;
+  });
+  std::rotate(clear.begin(), best, best + 1);
+  const Pose now = clear.front().camera_from_part;
+  instance.covariance = covariance_at(now.translation(), instance);
+  instance.camera_from_part = now;
+  for (std::size_t s = 0; s < instance.equivalent_poses.size(); ++s)
+    instance.equivalent_poses[s] = now * part.symmetry.discrete[s + 1];
+  instance.alternatives.assign(clear.begin() + 1, clear.end());
+  for (Alternative& a : instance.alternatives)
+    if (a.decided_by.empty()) a.decided_by = "the surface where the two poses differ";
+}
+
 void keep_apart(std::span<const Part> parts, const SceneDepth& scene, const BinSighting* bin,
                 std::vector<Instance>& items, std::vector<Reason>& rejected) {
   const bool in_bin = bin != nullptr && bin->found;
@@ -49,27 +121,13 @@ void keep_apart(std::span<const Part> parts, const SceneDepth& scene, const BinS
     const Part& part = part_of(parts, items[i]);
     const Solid* solid = solids[static_cast<std::size_t>(&part - parts.data())].get();
     if (solid == nullptr) continue;
-    Body body;
-    body.solid = solid;
-    body.points = part.sample_points;
-    body.normals = part.sample_normals;
-    body.camera_from_body = items[i].camera_from_part;
-    body.covariance = items[i].covariance;
-    body.tolerance_mm = form_tolerance_mm(part.diameter_mm) + part.mesh.chord_error_mm + part.coarse_error_mm;
-    bodies.push_back(body);
+    bodies.push_back(body_of(part, *solid, items[i].camera_from_part, items[i].covariance));
     item_of.push_back(i);
   }
   std::unique_ptr<Solid> bin_solid;
   if (in_bin) {
-    const Mesh mesh = bin_mesh(bin->shape);
-    bin_solid = std::make_unique<Solid>(mesh.vertices, mesh.triangles);
-    Body body;
-    body.solid = bin_solid.get();
-    body.camera_from_body = bin->camera_from_bin;
-    body.covariance = bin->covariance;
-    body.fixed = true;
-    body.tolerance_mm = bin->tolerance_mm;
-    bodies.push_back(body);
+    bin_solid = std::make_unique<Solid>(solid_of(*bin));
+    bodies.push_back(body_of(*bin, *bin_solid));
     item_of.push_back(items.size());
   }
   const std::vector<Overlap> overlap = overlaps(bodies);

@@ -18,4 +18,8 @@ namespace tribin {
 void keep_apart(std::span<const Part> parts, const SceneDepth& scene, const BinSighting* bin,
                 std::vector<Instance>& items, std::vector<Reason>& rejected);
 
+/// Self-similar poses that the scan does not tell apart may be told by the bin: what would stand in its floor or walls
+/// by more than its pose and the CAD's tolerance explain is struck out, and the likeliest of the others is the answer.
+void strike_out_in_bin(const Part& part, const BinSighting& bin, Instance& instance);
+
 }  // namespace tribin

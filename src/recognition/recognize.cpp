@@ -115,6 +115,10 @@ Instances recognize(const Primitives& primitives, const PrimitiveModel& observat
       if (!acceptable(part, p.candidate, out.rejected)) continue;
     }
     Answer answer = make_answer(p, last[i], shared_mm2, parts[static_cast<std::size_t>(p.candidate.part)], options);
+    if (options.bin != nullptr && options.bin->found && !answer.instance.alternatives.empty()) {
+      strike_out_in_bin(parts[static_cast<std::size_t>(p.candidate.part)], *options.bin, answer.instance);
+      score_again(answer);
+    }
     Instance& instance = answer.instance;
     const auto kept_back = [&](const char* test, double value, double limit) {
       add_reason(out.rejected, {instance.part, "acceptance", test, value, limit, 1,

@@ -1,11 +1,14 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
 
 #include "sim/drawn_scene.hpp"
 #include "sim/foreign_objects.hpp"
 #include "tribin/finder/finder.hpp"
+#include "tribin/io/cad_files.hpp"
 #include "tribin/recognition/bin.hpp"
+#include "tribin/sim/stable_rests.hpp"
 
 namespace tribin::sim {
 namespace {
@@ -125,6 +128,41 @@ TEST_F(SimulatedBin, ThreeMillimetresRaiseTheAlarm) {
     ASSERT_EQ(found.warnings.size(), 1u);
     EXPECT_EQ(found.warnings[0].code, "calibration_drift");
   }
+}
+
+/// Of a battery that lies on its lid or on a side, the scan shows faces that look alike turned round: the floor that it
+/// lies on, and edges seen aslant, tell which way it lies.
+TEST(ALoneBattery, IsFoundHoweverItLies) {
+  const std::vector<Mesh> meshes = {read_cad(std::filesystem::path(TRIBIN_SOURCE_DIR) / "examples/parts/battery.stl")};
+  const std::vector<Part> parts = {compile_part(meshes.front())};
+  const SceneStock stock = make_stock(meshes, SceneKind::empty, settings_of(Level::easy));
+  int upside_down = 0;
+  for (const StableRest& rest : stable_rests(meshes.front())) {
+    const Vec3 up = rest.table_from_part.linear().row(2);
+    if (up.z() > -0.8 && std::abs(up.y()) < 0.9) continue;  // on its lid, and on its long sides
+    for (const double turn : {2.4, 4.5}) {
+      SCOPED_TRACE(testing::Message() << "up " << up.transpose() << ", turned " << turn);
+      SeenBin seen = seen_bin(stock, SceneKind::empty, Level::easy, 7);
+      Pose turned = Pose::Identity();
+      turned.linear() = rotation_from_vector(Vec3(0, 0, turn));
+      turned.translation() = 0.25 * seen.shape.inner_size_mm.cwiseProduct(Vec3(std::cos(turn), std::sin(turn), 0));
+      const Pose camera_from_part = seen.drawn.camera_from_world * turned * rest.table_from_part;
+      seen.drawn.bodies.push_back({&meshes.front(), camera_from_part, 0.45, 1});
+      seen.scan = simulate_scan(seen.drawn.bodies, seen.drawn.sensor, 7).scan;
+      FinderOptions options;
+      options.bin = KnownBin{seen.shape, seen.drawn.camera_from_world, 0, 0};
+      const Found found = find_parts(seen.scan, parts, options);
+      upside_down += up.z() < -0.8;
+      ASSERT_EQ(found.instances.items.size(), 1u) << found.instances.uncertain.size() << " uncertain";
+      const Instance& instance = found.instances.items.front();
+      EXPECT_LT(rotation_angle(instance.camera_from_part.linear(), camera_from_part.linear()), 2 * kDegree);
+      const Vec3 middle = parts.front().box_center();
+      EXPECT_LT((instance.camera_from_part * middle - camera_from_part * middle).norm(), 1);
+      const Matrix3 place = instance.covariance.topLeftCorner<3, 3>();
+      EXPECT_LT(place.trace(), 1);
+    }
+  }
+  EXPECT_GE(upside_down, 2);
 }
 
 }  // namespace
