@@ -275,7 +275,7 @@ Polished polish(const SceneDepth& scene, std::span<const Part> parts, const Pose
   Polished out = polish_once(scene, parts, settled, also);
   // Upside down and turned: a pose that has changed is taken for others than the one it came from, but spins among
   // themselves are taken for the same.
-  constexpr int kMore = 2;
+  constexpr int kMore = 6;  // a pose that went on where nothing compared it with its own spins looked sure
   PoseCandidate from = settled;
   for (int i = 0; i < kMore; ++i) {
     const Pose& now = out.candidate.camera_from_part;
