@@ -20,6 +20,16 @@ TEST(Turned, IsUndoneByTheAngleThatIsRead) {
   }
 }
 
+/// Lies on the table at 650 mm below the camera, z up, turned by chance.
+Pose on_table(unsigned seed) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> turn(0, 2 * kPi);
+  Pose pose = Pose::Identity();
+  pose.linear() = rotation_from_vector(Vec3(kPi, 0, 0)) * rotation_from_vector(Vec3(0, 0, turn(random)));
+  pose.translation() = Vec3(0, 0, 650);
+  return pose;
+}
+
 /// Of a block that lies on the table only the top is seen. A search that took a narrower face for it, flush with one of
 /// its edges, is led back.
 TEST(Rivals, AnotherFaceFlushWithTheOneThatIsSeenIsOne) {
@@ -27,11 +37,7 @@ TEST(Rivals, AnotherFaceFlushWithTheOneThatIsSeenIsOne) {
   const Part part = compile_part(block);
   for (unsigned seed = 1; seed <= 6; ++seed) {
     SCOPED_TRACE(seed);
-    std::mt19937 random(seed);
-    std::uniform_real_distribution<double> turn(0, 2 * kPi);
-    Pose truth = Pose::Identity();
-    truth.linear() = rotation_from_vector(Vec3(kPi, 0, 0)) * rotation_from_vector(Vec3(0, 0, turn(random)));
-    truth.translation() = Vec3(0, 0, 650);
+    const Pose truth = on_table(seed);
     const Scan scan = test::posed_scan({{&block, truth}}, Vec3(0, 0, -1), -650, 0.1, 0.6, seed);
     const Surfels surfels = surfels_from_scan(scan);
     const SceneDepth scene = make_scene_depth(scan, surfels);
@@ -56,11 +62,7 @@ TEST(Rivals, AreThoseThatExplainAsMuchThoughMoreOfThemIsHidden) {
   const Part part = compile_part(block);
   for (unsigned seed = 1; seed <= 6; ++seed) {
     SCOPED_TRACE(seed);
-    std::mt19937 random(seed);
-    std::uniform_real_distribution<double> turn(0, 2 * kPi);
-    Pose truth = Pose::Identity();
-    truth.linear() = rotation_from_vector(Vec3(kPi, 0, 0)) * rotation_from_vector(Vec3(0, 0, turn(random)));
-    truth.translation() = Vec3(0, 0, 650);
+    const Pose truth = on_table(seed);
     constexpr double kEnd = -8;  // of what the plate leaves of the upper face: 37 of 90 mm
     Pose above = Pose::Identity();
     above.translation() = Vec3(kEnd + 60, 0, 47);
