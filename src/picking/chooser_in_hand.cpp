@@ -45,8 +45,7 @@ std::optional<std::vector<Stop>> Chooser::way_to_show(const Start& start, const 
 
 Grip Chooser::grip_of(const std::string& gripper, const Pose& base_from_tcp, const Pose& tcp_from_part,
                       const Matrix6& covariance, bool from_station) const {
-  Grip grip{&shape(gripper).gripper, base_from_tcp, tcp_from_part, covariance, !from_station};
-  return grip;
+  return {&shape(gripper).gripper, base_from_tcp, tcp_from_part, covariance, !from_station};
 }
 
 HeldPose Chooser::held(const Grip& grip, const std::string& part, std::span<const HandLook> looks,

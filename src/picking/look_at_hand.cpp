@@ -87,8 +87,7 @@ HandSight look_at_hand(const Scan& scan, const Pose& base_from_camera, const Par
     sight.why = "the scan holds no measurement, or no grid of a camera";
     return sight;
   }
-  SurfelOptions surfel;
-  const Surfels surfels = surfels_from_scan(rest, surfel);
+  const Surfels surfels = surfels_from_scan(rest);
   const KnownPose found = measure_known(surfels, part, expected);
   if (found.measured > kJudged && found.seen_through > kGone) {
     sight.state = HandSight::State::gone;

@@ -5,6 +5,7 @@
 #include "tribin/core/error.hpp"
 
 namespace tribin::picking {
+
 const Chooser::Start& Run::here() {
   if (!here_) {
     here_ = Chooser::Start{robot::pose_of(links_.controller->position()) * gripper_now().flange_from_tcp.inverse(), {}};

@@ -27,7 +27,7 @@ std::vector<Vec3f> ends_of(const Primitive& plane, const Surfels& surfels) {
 }
 
 /// Planes grow over cells beside them that no primitive has: their normals are spoiled by noise or by an edge, but they
-/// lie in the plane within what one pixel's noise is.
+/// lie in the plane within three sigma of one pixel.
 Image<std::int32_t> label_cells(const SceneFeatures& scene) {
   const Surfels& surfels = *scene.surfels;
   const Image<std::int32_t>& grid = surfels.surfel_of_cell;
